@@ -51,7 +51,7 @@ def main() -> None:
             last = 1e3 * theta[late]
             print(f"  {last.std():.2f} mrad (standard deviation), {last.mean():+.3f} mrad on the mean")
             if which == "play":
-                seen = ff.element_motion(system, motion, "hinge_1").outputs
+                seen = ff.results.element_motion(system, motion, "hinge_1").outputs
                 print(f"  pins free of their bearings {100 * (seen['contacts'][after] == 0).mean():.0f} % of the time")
                 print(f"  largest force on a pin {seen['force'].max():.0f} N", flush=True)
 

@@ -32,7 +32,9 @@ def coupled_rod(size):
 
     mesh = fe_models.read_mesh(rod_file(f"{size}mm", size))
     steel = fe_models.Material("steel", E=210e3, nu=0.3, rho=7.85e-9)
-    ends = [fe_models.rigid_interface(mesh, name, fe_models.FaceGroup(name)) for name in ("big_end", "small_end")]
+    ends = [
+        fe_models.rigid_interface(mesh, name, fe_models.selections.FaceGroup(name)) for name in ("big_end", "small_end")
+    ]
     return cms.couple(fe_models.solid_body(mesh, steel, name="rod", units=cms.unit_system("mm-t-s"), interfaces=ends))
 
 
@@ -40,7 +42,10 @@ def run(names, size):
     import cms
 
     body = coupled_rod(size)
-    loads = [cms.point_load("big_end", mass=1e-3, inertia=0.5), cms.point_load("small_end", mass=5e-4, stiffness=1e4)]
+    loads = [
+        cms.modes.point_load("big_end", mass=1e-3, inertia=0.5),
+        cms.modes.point_load("small_end", mass=5e-4, stiffness=1e4),
+    ]
     stages = {}
     start, cpu = time.perf_counter(), time.process_time()
     clock = start
@@ -50,7 +55,7 @@ def run(names, size):
         stages[stage] = time.perf_counter() - clock
         clock = time.perf_counter()
 
-    with cms.Families(body) as families:
+    with cms.modes.Families(body) as families:
         _ = families.fixed
         stamp("factorise")
         for name in names:

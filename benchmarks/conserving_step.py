@@ -17,24 +17,21 @@ import numpy as np
 
 from floatframe import (
     GROUND,
-    Bushing,
-    CoordinateCoupler,
-    EnergyDecaying,
-    EnergyMomentum,
-    Event,
     GeneralizedAlpha,
     Gravity,
-    JointCoordinate,
     JointForce,
     Marker,
     RevoluteJoint,
     RigidBody,
     System,
     UserForce,
-    Variational,
     integrate,
 )
 from floatframe.components.mechanisms import four_bar
+from floatframe.forces import Bushing
+from floatframe.integrators import EnergyDecaying, EnergyMomentum, Variational
+from floatframe.joints import CoordinateCoupler, JointCoordinate
+from floatframe.simulation import Event
 from tests.floatframe.integrators.examples import pendulum
 from tests.floatframe.model.bodies.examples import spinning
 

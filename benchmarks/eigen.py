@@ -75,7 +75,9 @@ def clamped_rod(size):
         mesh_connecting_rod(size=size, path=path)
         mesh = fe_models.read_mesh(path)
     steel = fe_models.Material("steel", E=210e3, nu=0.3, rho=7.85e-9)
-    ends = [fe_models.rigid_interface(mesh, name, fe_models.FaceGroup(name)) for name in ("big_end", "small_end")]
+    ends = [
+        fe_models.rigid_interface(mesh, name, fe_models.selections.FaceGroup(name)) for name in ("big_end", "small_end")
+    ]
     body = fe_models.solid_body(mesh, steel, name="rod", units=cms.unit_system("mm-t-s"), interfaces=ends)
     body = cms.couple(body)
     return principal_block(body.K, body.i), principal_block(body.M, body.i)

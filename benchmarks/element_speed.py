@@ -12,10 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from floatframe import GROUND, Element, ElementLaw, GeneralizedAlpha, Gravity, Marker, RigidBody, SpringDamper, System
+from floatframe import GROUND, GeneralizedAlpha, Gravity, Marker, RigidBody, SpringDamper, System
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.kernels.work import new_work
 from floatframe.integrators.integrator import Integrator
+from floatframe.model import Element, ElementLaw
 from floatframe.model.elements import Placed
 
 N_BODIES, N_STEPS, H, TURNS = 20, 2000, 1e-4, 7

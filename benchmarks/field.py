@@ -17,7 +17,8 @@ import numpy as np
 from scipy.special import ellipj, ellipk
 
 from benchmarks.field_beams import Describe, exact, marker_of, parts, path, segments, superelements
-from floatframe import GeneralizedAlpha, System, Trajectory, integrate, snapshot, static_equilibrium
+from floatframe import GeneralizedAlpha, System, Trajectory, integrate, static_equilibrium
+from floatframe.analyses import snapshot
 from floatframe.components.mechanisms import (
     andrews_mechanism,
     bricard_mechanism,

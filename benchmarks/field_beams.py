@@ -9,7 +9,8 @@ import numpy as np
 import cms
 import fe_models as fm
 from fe_models.body.beam_line import BeamLine
-from floatframe import System, Trajectory, corotational, exact_beams, finite_segments, floating_parts
+from floatframe import System, Trajectory
+from floatframe.components import corotational, exact_beams, finite_segments, floating_parts
 from floatframe.components.flexible_parts import FlexiblePart, PartMaker
 from floatframe.model.bodies.markers import Marker
 from floatframe.results.place_motion import interface_motion, point_motion
@@ -36,7 +37,7 @@ def superelements(n: int) -> Describe:
 
     def describe(line: BeamLine) -> PartMaker:
         piece = replace(line, length=line.length / n)
-        body = cms.beam_from_assumed_modes(
+        body = cms.reduction.beam_from_assumed_modes(
             piece, name="element", units=UNITS, n_axial=1, n_bending=2, n_torsion=1, geometric=False
         )
 
@@ -54,7 +55,7 @@ def parts(n: int, *, n_torsion: int = 3, stiffening: bool = True) -> Describe:
 
     def describe(line: BeamLine) -> PartMaker:
         piece = replace(line, length=line.length / n)
-        body = cms.beam_from_assumed_modes(
+        body = cms.reduction.beam_from_assumed_modes(
             piece, name="piece", units=UNITS, n_axial=1, n_bending=4, n_torsion=n_torsion
         )
 
@@ -73,13 +74,16 @@ def exact(n: int) -> Describe:
     def describe(line: BeamLine) -> PartMaker:
         E, G = 1e11, 1e11 / 2.6
         A = line.EA / E
-        section = fm.GeneralSection(A, line.EIy / E, line.EIz / E, line.GJ / G, A_sy=line.GAy / G, A_sz=line.GAz / G)
+        section = fm.beams.GeneralSection(
+            A, line.EIy / E, line.EIz / E, line.GJ / G, A_sy=line.GAy / G, A_sz=line.GAz / G
+        )
         material = fm.Material("of the line", E=E, nu=0.3, rho=line.rho_A / A)
-        mesh = fm.straight_line((0, 0, 0), (line.length, 0, 0), 2)
+        mesh = fm.beams.straight_line((0, 0, 0), (line.length, 0, 0), 2)
         kept = [
-            fm.line_interface(mesh, place, fm.NodeIndices((k,))) for k, place in enumerate(("start", "middle", "end"))
+            fm.beams.line_interface(mesh, place, fm.beams.NodeIndices((k,)))
+            for k, place in enumerate(("start", "middle", "end"))
         ]
-        prop = fm.BeamProperty(section, material, orientation=(0, 1, 0))
+        prop = fm.beams.BeamProperty(section, material, orientation=(0, 1, 0))
         body = fm.beam_body(mesh, prop, name="beam", units=UNITS, interfaces=kept)
         return partial(exact_beams, body=body, pieces=n // 2)
 

@@ -79,7 +79,7 @@ RX_90 = {"angles": (0, 90, 0, -90, 90, -90), "along_x": (0, 0, 0.45, 0, 0, 0), "
 def road_car() -> ff.System:
     """Return the rigid tree of the road car: 20 bodies, 31 rates."""
     shipped = next(path for path in machine_files("road-car") if path.name == "lane_change_bars.toml")
-    tables = dict(read_parametric(shipped, ff.ModelError))
+    tables = dict(read_parametric(shipped, ff.errors.ModelError))
     J = np.diag([450.0, 1500.0, 1650.0]).tolist()
     tables["bodies"]["chassis"] = {"mass": 1100.0, "inertia": J, "center_of_mass": [0, 0, 0.5]}
     joints = {name: each for name, each in tables["joints"].items() if each["type"] != "distance"}
@@ -119,13 +119,13 @@ def looped(made: ctypes.CDLL, given: np.ndarray, out: np.ndarray, times: int) ->
     made.loop(ctypes.c_long(times), pointer(given), pointer(out))
 
 
-def bent(model: ff.RelativeModel) -> ff.RelativeModel:
+def bent(model: ff.analyses.RelativeModel) -> ff.analyses.RelativeModel:
     """Return a model of flexible bodies with a motion in its working arrays, elastic rotations of half a radian."""
     model.take(*bent_motion(model, 0, angle=0.5))
     return model
 
 
-def costs(model: ff.RelativeModel, calls: int, folder: Path) -> None:
+def costs(model: ff.analyses.RelativeModel, calls: int, folder: Path) -> None:
     """Print operations and times of one system; a motion is in the working arrays of its model."""
     system, n = model.expansion.system, model.n_rates
     z, v, a = model.work.x.copy(), model.work.v.copy(), model.work.a.copy()
@@ -134,7 +134,7 @@ def costs(model: ff.RelativeModel, calls: int, folder: Path) -> None:
     print("            operations          general recursion    µs of a call                     ratio")
     print("            +        *          +        *           -O2      native   compiled       -O2   native")
     for what, task in TASKS.items():
-        code = ff.generate(system, what=what, name=f"tree_{what}")
+        code = ff.design.generate(system, what=what, name=f"tree_{what}")
         out = np.zeros(sum(outputs[what]))
         sizes = [len(each) for each in inputs[what]], outputs[what]
         runs: list[Callable[[int], object]] = [partial(model.run, task)]
@@ -172,20 +172,20 @@ def single_calls(made: ctypes.CDLL, calls: int, given: np.ndarray, out: np.ndarr
 def beside_others() -> None:
     """Print operations of inverse dynamics beside those of other programs."""
     print("\noperations of inverse dynamics     ours: +    *      theirs: +    *")
-    ours, theirs = ff.generate(six_axes(), language="python", name="f"), sympy_operations(six_axes())
+    ours, theirs = ff.design.generate(six_axes(), language="python", name="f"), sympy_operations(six_axes())
     row = f"{ours.operations.additions:<4d} {ours.operations.multiplications:<12d} {theirs[0]:<4d} {theirs[1]}"
     print(f"PUMA 560, SymPy's cse              {row}")
-    rx_90 = ff.generate(six_axes(**RX_90, gravity=(0, 0, 0)), parameters=["link*"]).operations
+    rx_90 = ff.design.generate(six_axes(**RX_90, gravity=(0, 0, 0)), parameters=["link*"]).operations
     print(f"RX 90, moments symbols, OpenSYMORO {rx_90.additions:<4d} {rx_90.multiplications:<12d} {276:<4d} {325}")
-    rx_90 = ff.generate(six_axes(**RX_90, gravity=(0, 0, 0))).operations
+    rx_90 = ff.design.generate(six_axes(**RX_90, gravity=(0, 0, 0))).operations
     print(f"RX 90, moments numbers             {rx_90.additions:<4d} {rx_90.multiplications}")
 
 
 def figures(short: bool) -> dict[str, float]:
     """Return what the watch keeps: of the robot of six axes."""
-    model = moving(ff.relative_model(six_axes()))
+    model = moving(ff.analyses.relative_model(six_axes()))
     z, v, a = model.work.x.copy(), model.work.v.copy(), model.work.a.copy()
-    code = ff.generate(model.expansion.system, what="inverse", name="robot")
+    code = ff.design.generate(model.expansion.system, what="inverse", name="robot")
     n, out = model.n_rates, np.zeros(model.n_rates)
     with tempfile.TemporaryDirectory() as folder:
         made = library(code, [len(z), n, n], [n], Path(folder), "-O2")
@@ -205,12 +205,12 @@ def main() -> None:
     parser.add_argument("--calls", type=int, default=1_000_000, help="of which quantiles are taken")
     calls = parser.parse_args().calls
     models = {
-        "robot of six axes": moving(ff.relative_model(six_axes())),
-        "road car, 20 bodies, 31 rates": moving(ff.relative_model(road_car())),
-        "arm of two clamped beams, 4 modes each": bent(ff.relative_model(two_link_arm())),
-        "beam in mean axes on a hinge, 6 modes, geometric stiffness": bent(ff.relative_model(pendulum())),
-        "rigid link, such a beam with 4 modes, rigid tool": bent(ff.relative_model(flexible_in_the_middle())),
-        "body on a hinge, 8 modes without a zero in its invariants": bent(ff.relative_model(dense_body())),
+        "robot of six axes": moving(ff.analyses.relative_model(six_axes())),
+        "road car, 20 bodies, 31 rates": moving(ff.analyses.relative_model(road_car())),
+        "arm of two clamped beams, 4 modes each": bent(ff.analyses.relative_model(two_link_arm())),
+        "beam in mean axes on a hinge, 6 modes, geometric stiffness": bent(ff.analyses.relative_model(pendulum())),
+        "rigid link, such a beam with 4 modes, rigid tool": bent(ff.analyses.relative_model(flexible_in_the_middle())),
+        "body on a hinge, 8 modes without a zero in its invariants": bent(ff.analyses.relative_model(dense_body())),
     }
     for title, model in models.items():
         print(f"\n{title}")

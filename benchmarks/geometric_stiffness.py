@@ -34,10 +34,12 @@ def measured(million):
     mesh = fe_models.read_mesh(path)
     steel = fe_models.Material("steel", E=210e3, nu=0.3, rho=7.85e-9)
     fe_models.report_mesh(mesh, steel, units="mm-t-s").raise_for_errors()
-    ends = [fe_models.rigid_interface(mesh, name, fe_models.FaceGroup(name)) for name in ("big_end", "small_end")]
+    ends = [
+        fe_models.rigid_interface(mesh, name, fe_models.selections.FaceGroup(name)) for name in ("big_end", "small_end")
+    ]
     body = cms.couple(fe_models.solid_body(mesh, steel, name="rod", units=cms.unit_system("mm-t-s"), interfaces=ends))
     clock("mesh to coupled body")
-    with cms.Families(body) as families:
+    with cms.modes.Families(body) as families:
         modes = cms.craig_bampton(families, n_modes=N_MODES)
         clock("mode set")
         reduced = cms.reduce(families, modes, geometric=False)

@@ -20,16 +20,16 @@ PERIOD, ROWS = 10.0, 200
 def main() -> None:
     """Print a table."""
     n = int(sys.argv[1]) if len(sys.argv) > 1 else 200
-    form = ff.linear_form(six_axes(**KUKA_LIKE, seed=4), ("viscous", "coulomb"))
+    form = ff.design.identification.linear_form(six_axes(**KUKA_LIKE, seed=4), ("viscous", "coulomb"))
     phi = form.values
     phi[60:66], phi[66:] = 5.0, 3.0
     names = [f"joint{k + 1}/angle" for k in range(6)]
-    limits = dict.fromkeys(names, ff.MotionLimits(-2.5, 2.5, 3.0, 12.0))
-    base = ff.base_parameters(form)
+    limits = dict.fromkeys(names, ff.design.identification.MotionLimits(-2.5, 2.5, 3.0, 12.0))
+    base = ff.design.identification.base_parameters(form)
     options = {"period": PERIOD, "n_harmonics": 5, "n_instants": 40}
-    plain = ff.exciting_motion(base, limits, **options, max_iterations=0)
-    motion = ff.exciting_motion(base, limits, **options, max_iterations=15)
-    samples = ff.tree_samples(form.system, *motion.at(np.arange(ROWS) * PERIOD / ROWS))
+    plain = ff.design.identification.exciting_motion(base, limits, **options, max_iterations=0)
+    motion = ff.design.identification.exciting_motion(base, limits, **options, max_iterations=15)
+    samples = ff.design.identification.tree_samples(form.system, *motion.at(np.arange(ROWS) * PERIOD / ROWS))
     print(f"base parameters with friction: torques {len(base.kept)}")
     tau, wrench = form.torques(samples) @ phi, form.reactions(samples) @ phi
     print(f"condition number: best of random motions {plain.condition:.1f}, improved {motion.condition:.1f}")
@@ -37,15 +37,15 @@ def main() -> None:
     print("measured".ljust(12) + "".join(word.rjust(width) for word, width in heads))
     shared = {}
     for source in ("torques", "reactions", "both"):
-        own = ff.base_parameters(form, source=source)
+        own = ff.design.identification.base_parameters(form, source=source)
         rng = np.random.default_rng(1)
         found, predicted = [], []
         for _ in range(n):
             noisy = tau + TORQUE_NOISE * rng.normal(size=tau.shape), wrench + BASE_NOISE * rng.normal(size=wrench.shape)
-            data = ff.Measured(
+            data = ff.design.identification.Measured(
                 samples, None if source == "reactions" else noisy[0], None if source == "torques" else noisy[1]
             )
-            made = ff.estimate(form, data, base=own)
+            made = ff.design.identification.estimate(form, data, base=own)
             found.append(made.values)
             predicted.append(made.deviations)
         error, deviation = np.array(found) - own.values(phi), np.mean(predicted, axis=0)

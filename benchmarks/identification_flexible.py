@@ -33,7 +33,7 @@ def main() -> None:
     n = int(sys.argv[1]) if len(sys.argv) > 1 else 200
     logging.disable(logging.WARNING)
     t = np.arange(round(T_END / DISTANCE) + 1) * DISTANCE
-    exact = ff.computed_outputs(arm(TRUTH), t, OUTPUTS, h=STEP).table
+    exact = ff.design.identification.computed_outputs(arm(TRUTH), t, OUTPUTS, h=STEP).table
     truth = np.array([*TRUTH.values(), frequency(TRUTH)])
     for title, outputs in SETS.items():
         pick = [OUTPUTS.index(name) for name in outputs]
@@ -42,8 +42,8 @@ def main() -> None:
         found, predicted = [], []
         for _ in range(n):
             noisy = exact[:, pick] + NOISE[pick] * rng.normal(size=(len(t), len(pick)))
-            data = ff.MeasuredOutputs(t, dict(zip(outputs, noisy.T, strict=True)))
-            made = ff.fit_outputs(arm, TRUTH, data, h=STEP, near=first)
+            data = ff.design.identification.MeasuredOutputs(t, dict(zip(outputs, noisy.T, strict=True)))
+            made = ff.design.identification.fit_outputs(arm, TRUTH, data, h=STEP, near=first)
             first = first or made
             f, deviation = made.derived(frequency)
             found.append([*made.values, f])

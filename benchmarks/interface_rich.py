@@ -155,7 +155,7 @@ def error():
 
     exact = frequencies(whole)
     for n in (0, 5, 10, 20, 40, 80):
-        errors = frequencies(cms.with_characteristic_modes(whole, body, n)) / exact - 1
+        errors = frequencies(cms.modes.with_characteristic_modes(whole, body, n)) / exact - 1
         print(f"{n:3} modes kept: {errors.max():.1e} (least {errors.min():.1e})", flush=True)
 
 

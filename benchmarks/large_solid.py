@@ -39,7 +39,9 @@ def solid(path, ranks=None):
     yield "read", mesh
     fe_models.report_mesh(mesh, steel, units="mm-t-s").raise_for_errors()
     yield "report", None
-    ends = [fe_models.rigid_interface(mesh, name, fe_models.FaceGroup(name)) for name in ("big_end", "small_end")]
+    ends = [
+        fe_models.rigid_interface(mesh, name, fe_models.selections.FaceGroup(name)) for name in ("big_end", "small_end")
+    ]
     units = cms.unit_system("mm-t-s")
     body = fe_models.solid_body(mesh, steel, name="rod", units=units, interfaces=ends, ranks=ranks)
     yield "assemble", None

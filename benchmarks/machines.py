@@ -78,7 +78,7 @@ def in_both(path: Path, t: float) -> str:
             ff.integrate(system, integrator, 3 * h, h / parts, formulation=formulation)
             begun = time.process_time()
             motion = ff.integrate(system, integrator, steps * h, h / parts, formulation=formulation)
-        except ff.FloatframeError as error:
+        except ff.errors.FloatframeError as error:
             return f"{formulation}: {str(error).splitlines()[0]}"
         costs.append((time.process_time() - begun) / (steps * h))
         found.append(np.array([motion.body(body.name).r[::parts] for body in system.bodies]))

@@ -81,7 +81,7 @@ def figures(short: bool) -> dict[str, float]:
         texts = [Path(folder) / "block_STIF1.mtx", Path(folder) / "block_MASS1.mtx"]
         for path, matrix in zip(texts, (K, M), strict=True):
             write_mtx(path, matrix)
-        size, bytes_wall, wall, _ = measured(texts, lambda: fe_models.read_matrices(texts))
+        size, bytes_wall, wall, _ = measured(texts, lambda: fe_models.files.read_matrices(texts))
         pair = Path(folder) / "pair.op4"
         write_op4(pair, {"KAA": K, "MAA": M})
         _, pair_bytes, pair_wall, _ = measured([pair], lambda: read_op4(pair))
@@ -104,7 +104,7 @@ def main() -> None:
         texts = [Path(folder) / "block_STIF1.mtx", Path(folder) / "block_MASS1.mtx"]
         for path, matrix in zip(texts, (K, M), strict=True):
             write_mtx(path, matrix)
-        report(f".mtx, {K.shape[0]} dofs", texts, lambda: fe_models.read_matrices(texts))
+        report(f".mtx, {K.shape[0]} dofs", texts, lambda: fe_models.files.read_matrices(texts))
         for path in texts:
             path.unlink()
         K, M = block_pattern(arguments.dofs)
@@ -113,7 +113,7 @@ def main() -> None:
         write_op4(pair, {"KAA": K, "MAA": M})
         del K, M
         report(f"OP4, {n_dof} dofs, matrices alone", [pair], lambda: read_op4(pair))
-        report(f"OP4, {n_dof} dofs, read_matrices", [pair], lambda: fe_models.read_matrices(pair))
+        report(f"OP4, {n_dof} dofs, read_matrices", [pair], lambda: fe_models.files.read_matrices(pair))
 
 
 if __name__ == "__main__":

@@ -57,8 +57,8 @@ def main(folder: Path, picture: Path | None) -> None:
 def report(name: str, system: ff.System, motion: ff.Trajectory, multiples: tuple[int, ...], data: MotorBogie) -> None:
     """Print what a start has, and its lines beside those of even running."""
     t = np.asarray(motion.t)
-    seen = ff.element_motion(system, motion, "leading_drive").outputs
-    force = ff.measured(system, motion)[LOAD].columns[COLUMN]
+    seen = ff.results.element_motion(system, motion, "leading_drive").outputs
+    force = ff.sensors.measured(system, motion)[LOAD].columns[COLUMN]
     late = t > t[-1] - 1.0
     speed = motion.body("body").v[-1, 0]
     print(f"\n{name}: {speed:.2f} m/s at the end, torque {seen['torque'][late].mean():.0f} N m in the last second")
@@ -89,9 +89,9 @@ def report(name: str, system: ff.System, motion: ff.Trajectory, multiples: tuple
 def draw(system: ff.System, motion: ff.Trajectory, multiples: tuple[int, ...], data: MotorBogie, path: Path) -> None:
     """Write the picture of a start."""
     t = np.asarray(motion.t)
-    seen = ff.element_motion(system, motion, "leading_drive").outputs
+    seen = ff.results.element_motion(system, motion, "leading_drive").outputs
     torque, n = seen["torque"], round(0.5 / (t[1] - t[0]))
-    force = ff.measured(system, motion)[LOAD].columns[COLUMN]
+    force = ff.sensors.measured(system, motion)[LOAD].columns[COLUMN]
     maps = [
         (frequency_map(Signal(title, t, np.asarray(values), unit), n_segment=n, overlap=0.95), lines)
         for title, values, unit, lines in (

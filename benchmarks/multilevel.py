@@ -5,9 +5,9 @@
     python -m benchmarks.multilevel solid 24 100       # a cube of 24 x 24 x 24 hexahedra
     python -m benchmarks.multilevel errors             # cutoff factors on several bodies, against the true frequencies
 
-"multilevel" is `cms.multilevel` with its default options, "direct" `cms.craig_bampton` with as many modes: constraint
-modes, fixed-interface modes, the mode set; assembly is not counted. Each is a process of its own, so the peaks of
-memory are their own, of the whole process. The shell is a curved panel of n x n quads between two rigid
+"multilevel" is `cms.modes.multilevel` with its default options, "direct" `cms.craig_bampton` with as many modes:
+constraint modes, fixed-interface modes, the mode set; assembly is not counted. Each is a process of its own, so the
+peaks of memory are their own, of the whole process. The shell is a curved panel of n x n quads between two rigid
 edges, the solid a cube between two rigid faces. The error: multilevel frequencies against the direct ones.
 """
 
@@ -48,12 +48,16 @@ def body_of(kind, n):
             for name, x in (("left", 0.0), ("right", 1.0))
         ]
         return cms.couple(solid_body(mesh, STEEL, name="cube", units=SI, interfaces=ends))
-    mesh = fm.flat_plate(1.0, 0.7, n, n)
+    mesh = fm.shells.flat_plate(1.0, 0.7, n, n)
     edges = ("u0", "u1") if kind == "plate" else ("u0",)  # held along two edges, or almost free
-    property_ = fm.ShellProperty(0.004, fm.Material("steel", E=2.1e11, nu=0.3, rho=7850.0))
+    property_ = fm.shells.ShellProperty(0.004, fm.Material("steel", E=2.1e11, nu=0.3, rho=7850.0))
     return cms.couple(
         fm.shell_body(
-            mesh, property_, name=kind, units=SI, interfaces=[fm.shell_interface(mesh, e, fm.NodeSet(e)) for e in edges]
+            mesh,
+            property_,
+            name=kind,
+            units=SI,
+            interfaces=[fm.shells.shell_interface(mesh, e, fm.selections.NodeSet(e)) for e in edges],
         )
     )
 
@@ -64,7 +68,7 @@ def run(what, kind, n, n_modes):
 
     small = body_of(kind, 6)
     body = body_of(kind, n)
-    way = {"multilevel": cms.multilevel, "direct": cms.craig_bampton}[what]
+    way = {"multilevel": cms.modes.multilevel, "direct": cms.craig_bampton}[what]
     way(small, n_modes=4)  # compiled
     clock, processor = time.perf_counter(), time.process_time()
     modes = way(body, n_modes=n_modes)
@@ -117,7 +121,7 @@ def errors():
     import cms
     from cms.linear_algebra.substructures import modes
 
-    cms_modes, most = cms.multilevel, modes.MOST_STEPS
+    cms_modes, most = cms.modes.multilevel, modes.MOST_STEPS
     for kind, n, n_modes in BODIES:
         body = body_of(kind, n)
         true = cms.craig_bampton(body, n_modes=n_modes).frequencies[-n_modes:]

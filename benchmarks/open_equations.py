@@ -10,7 +10,7 @@ CALLS = 300
 
 def main() -> None:
     """Print a line a function."""
-    eq = ff.open_equations(slider_crank(angle=0.5, speed=3.0))
+    eq = ff.analyses.open_equations(slider_crank(angle=0.5, speed=3.0))
     x, v, a, lam = eq.start()
     calls = {
         "residual": lambda: eq.residual(0.0, x, v, a, lam),

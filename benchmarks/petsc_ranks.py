@@ -80,7 +80,7 @@ def whole(body, solver, stage):
     """The mode set, reduction and file."""
     import cms
 
-    with cms.Families(body, solver=solver) as families:
+    with cms.modes.Families(body, solver=solver) as families:
         with stage("factor"):
             factor = families.fixed.factorization.factor
         with stage("constraint modes"):

@@ -63,7 +63,7 @@ def where_modes_move(size: float) -> None:
     equipment = ("transformer", "converter", "cooler", "underfloor", "headstock", "cab")
     places = body.nodes[[int(sets[name][0]) for name in sets if name.split("_")[0] in equipment]]
     at_mount = (np.abs(body.nodes[:, None] - places).max(axis=2) < 1e-6).any(axis=1)[body.dofs[:, 0]]
-    with cms.Families(body) as families:
+    with cms.modes.Families(body) as families:
         for kind, modes in (("free", families.free_modes(n_modes=80)), ("held", families.fixed_modes(n_modes=80))):
             energy = modes.Phi * (body.M @ modes.Phi)
             share = energy[at_mount].sum(axis=0) / energy.sum(axis=0)

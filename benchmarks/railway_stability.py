@@ -50,7 +50,7 @@ def circles(radii: list[float], cant: float = 0.1) -> None:
             roots, modes = lateral_modes(linear)
             k = int(np.argmin(-roots.real / np.abs(roots)))
             fastest = modes.eigenvalues[np.argmax(modes.eigenvalues.real)]
-            at = ff.snapshot(motion.system, motion.equilibrium).body(AXLE).r[0]
+            at = ff.analyses.snapshot(motion.system, motion.equilibrium).body(AXLE).r[0]
             shift = aside(at, radius, cant)
             cost = time.process_time() - begin
             print(

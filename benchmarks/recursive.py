@@ -11,6 +11,7 @@ import numpy as np
 import scipy.linalg as la
 
 import cms
+import fe_models
 import floatframe as ff
 from floatframe.components.mechanisms import chain
 from floatframe.engine.tree.recursion.entry import FORWARD, INVERSE, MASS, TANGENTS
@@ -37,7 +38,7 @@ def shortest(run: Callable[[int], object], seconds: float = 0.08) -> float:
     return 1e6 * min(times)
 
 
-def moving(model: ff.RelativeModel, seed: int = 0) -> ff.RelativeModel:
+def moving(model: ff.analyses.RelativeModel, seed: int = 0) -> ff.analyses.RelativeModel:
     """Return a model with a motion in its working arrays."""
     rng = np.random.default_rng(seed)
     z = model.moved(model.positions()[0], 0.3 * rng.normal(size=model.n_rates))
@@ -45,14 +46,14 @@ def moving(model: ff.RelativeModel, seed: int = 0) -> ff.RelativeModel:
     return model
 
 
-def compiled(model: ff.RelativeModel, what: int) -> float:
+def compiled(model: ff.analyses.RelativeModel, what: int) -> float:
     """Return the processor time of one evaluation [µs]."""
     return shortest(lambda n: model.run(what, n))
 
 
 def times_of_chains(sizes: tuple[int, ...], tasks: dict[str, int] = TASKS) -> dict[str, list[float]]:
     """Return times over the length of a chain of rigid bodies on hinges [µs]."""
-    models = [moving(ff.relative_model(chain(n))) for n in sizes]
+    models = [moving(ff.analyses.relative_model(chain(n))) for n in sizes]
     return {name: [compiled(model, what) for model in models] for name, what in tasks.items()}
 
 
@@ -86,7 +87,7 @@ def pairs_of_times(branching: float) -> dict[str, tuple[float, float]]:
     }
     rng = np.random.default_rng(1)
     links = random_tree(30, rng, kinds=("revolute",), branching=branching, reverse=False)
-    model, other = ff.relative_model(system_of(links)), PinocchioTree(links)
+    model, other = ff.analyses.relative_model(system_of(links)), PinocchioTree(links)
     z, z_dot, z_ddot = random_state(links, rng)
     model.take(z, z_dot, z_ddot)
     theirs = other.model, other.data, other.x(z), other.v(z_dot), other.v(z_ddot)
@@ -127,7 +128,7 @@ def against_factorisation() -> None:
     """Print forward dynamics by articulated bodies beside mass matrix and its Cholesky factors."""
     print("\nforward dynamics of chains, µs: articulated bodies; mass matrix, inverse dynamics and Cholesky; ratio")
     for n in (3, 6, 10, 30, 100, 300):
-        model = moving(ff.relative_model(chain(n)))
+        model = moving(ff.analyses.relative_model(chain(n)))
         articulated = compiled(model, FORWARD)
         both = compiled(model, MASS) + compiled(model, INVERSE)
         M, right = model.mass_matrix(model.work.x), np.ones(n)
@@ -145,15 +146,15 @@ def flexible() -> None:
     """Print times of a chain of 30 flexible beams over their modes."""
     print("\nchain of 30 flexible beams with geometric stiffness, µs")
     print(f"{'':16s}" + "".join(f"{name:>18s}" for name in TASKS))
-    line = cms.BeamLine(1.0, 4.7, 1.26e8, 4.2e3, 9.5e3, 3.8e3, rho_Iy=1.6e-4, rho_Iz=3.5e-4)
+    line = fe_models.beams.BeamLine(1.0, 4.7, 1.26e8, 4.2e3, 9.5e3, 3.8e3, rho_Iy=1.6e-4, rho_Iz=3.5e-4)
     for n_bending in (0, 2, 4, 8):
         rod = None
         if n_bending:
-            rod = cms.beam_from_assumed_modes(
+            rod = cms.reduction.beam_from_assumed_modes(
                 line, name="beam", units=cms.unit_system("m-kg-s"), n_axial=1, n_bending=n_bending, n_torsion=1,
                 n_shear=0, stations={"start": 0.0, "end": 1.0},
             )  # fmt: skip
-        model = moving(ff.relative_model(chain(30, rod=rod)))
+        model = moving(ff.analyses.relative_model(chain(30, rod=rod)))
         times = [compiled(model, what) for what in TASKS.values()]
         print(f"{rod.n_q if rod else 0:4d} modes a beam" + "".join(f"{took:18.1f}" for took in times))
 

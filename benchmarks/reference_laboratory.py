@@ -41,10 +41,11 @@ def main() -> None:
             system.bodies, system.joints, system.forces, system.units, system.name, couplers=system.couplers,
             sensors=sensors,
         )  # fmt: skip
-        cases = [ff.Case(kind, n) for kind, counts in SETS.items() for n in counts]
-        result = ff.study(
+        cases = [ff.design.laboratory.Case(kind, n) for kind, counts in SETS.items() for n in counts]
+        result = ff.design.laboratory.study(
             system, "rod", folder / "rod.toml", cases, integrator=ff.GeneralizedAlpha(rho_inf=0.6), t_end=T_END, h=H,
-            reference=ff.Case("craig-bampton-ir", 100), on_case=lambda row: print(".", end="", flush=True),
+            reference=ff.design.laboratory.Case("craig-bampton-ir", 100),
+            on_case=lambda row: print(".", end="", flush=True),
         )  # fmt: skip
     print(
         "\n| set | modes | coordinates | pin force x | pin force y | drive torque | time [s] |\n"

@@ -19,7 +19,7 @@ from floatframe.components.mechanisms import chain
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.kernels.work import new_work
 from floatframe.errors import FloatframeError
-from floatframe.integrators import in_formulation
+from floatframe.integrators.relative import in_formulation
 
 FORMULATIONS = ("absolute", "relative")
 
@@ -40,10 +40,10 @@ def cost(system: System, formulation: str, n_steps: int, h: float = 1e-3) -> tup
 
 def beam(n_modes: int) -> cms.ReducedBody:
     """Return a slender aluminium-like beam with interfaces at its ends, geometric stiffness included."""
-    mesh = fm.straight_line((0, 0, 0), (1, 0, 0), 8)
-    ends = [fm.line_interface(mesh, name, fm.NodeIndices((k,))) for name, k in (("start", 0), ("end", 8))]
+    mesh = fm.beams.straight_line((0, 0, 0), (1, 0, 0), 8)
+    ends = [fm.beams.line_interface(mesh, name, fm.beams.NodeIndices((k,))) for name, k in (("start", 0), ("end", 8))]
     material = fm.Material("soft", E=4e9, nu=0.3, rho=2700.0)
-    section = fm.BeamProperty(fm.Rectangle(0.03, 0.02), material, orientation=(0, 1, 0))
+    section = fm.beams.BeamProperty(fm.beams.Rectangle(0.03, 0.02), material, orientation=(0, 1, 0))
     body = cms.couple(fm.beam_body(mesh, section, name="beam", units=cms.unit_system("m-kg-s"), interfaces=ends))
     return cms.reduce(body, cms.craig_bampton(body, n_modes=n_modes), geometric=True)
 

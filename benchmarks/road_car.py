@@ -82,8 +82,10 @@ def posts(folder: Path) -> None:
                     }
                     overlays = ["fixed_subframes.toml"] if car.mount_stiffness is None else []
                     system, _ = read(folder, "rig.toml", support, values, *overlays)
-                    rest = ff.snapshot(system, ff.static_equilibrium(system))
-                    forces.append(np.array([ff.coupler_motion(system, rest, f"post_{c}").force[0, 0] for c in CORNERS]))
+                    rest = ff.analyses.snapshot(system, ff.static_equilibrium(system))
+                    forces.append(
+                        np.array([ff.results.coupler_motion(system, rest, f"post_{c}").force[0, 0] for c in CORNERS])
+                    )
                     expected = CarOnPosts(car, support).forces(height * way)
                     worst = max(worst, float(np.abs(forces[-1] - expected).max() / np.abs(expected).max()))
                 stiffness[support, mode] = float((forces[0] - forces[1]) @ way / 4 / (2 * small))

@@ -26,15 +26,15 @@ def system() -> ff.System:
     joints = [ff.SphericalJoint("pin", ff.GROUND, pin), ff.RevoluteJoint("axle", tip, wheel, axis=(0, 0, 1))]
     quantities = ("position", "velocity", "acceleration", "rotation-vector", "angular-velocity")
     sensors = [
-        *(ff.PlaceSensor(quantity, tip, quantity) for quantity in quantities),
-        ff.PlaceSensor("acceleration seen from the tip", wheel, "acceleration", relative_to=tip),
-        ff.AngleSensor("angle", tip, wheel),
-        ff.CoordinateSensor("coordinate", "axle", "angle"),
-        ff.ReactionSensor("reaction", "axle"),
-        ff.ReactionSensor("reaction in the axes of the tip", "axle", axes="marker"),
-        ff.DisplacementSensor("displacement", tip),
-        ff.EnergySensor("energy"),
-        ff.ModeSensor("mode", "rod", 1),
+        *(ff.sensors.PlaceSensor(quantity, tip, quantity) for quantity in quantities),
+        ff.sensors.PlaceSensor("acceleration seen from the tip", wheel, "acceleration", relative_to=tip),
+        ff.sensors.AngleSensor("angle", tip, wheel),
+        ff.sensors.CoordinateSensor("coordinate", "axle", "angle"),
+        ff.sensors.ReactionSensor("reaction", "axle"),
+        ff.sensors.ReactionSensor("reaction in the axes of the tip", "axle", axes="marker"),
+        ff.sensors.DisplacementSensor("displacement", tip),
+        ff.sensors.EnergySensor("energy"),
+        ff.sensors.ModeSensor("mode", "rod", 1),
     ]
     return ff.System(bodies, joints, [ff.Gravity((0, 0, -9.81))], sensors=sensors)
 
@@ -47,7 +47,7 @@ def main() -> None:
         times = []
         for _ in range(5):
             began = time.process_time()
-            ff.measured(made, motion, [sensor])  # type: ignore[list-item]
+            ff.sensors.measured(made, motion, [sensor])  # type: ignore[list-item]
             times.append(time.process_time() - began)
         print(f"{sensor.name:34s} {1e6 * min(times) / len(motion.t):8.2f} us a row")
 

@@ -23,7 +23,7 @@ from tests.fe_models.small_shells import KINDS, SI, STEEL, frequencies, of_nodes
 
 def errors(kind, n):
     """Return name -> error in %, the worst mode of each case."""
-    mesh = fm.flat_plate(10.0, 10.0, n, n, kind=kind)
+    mesh = fm.shells.flat_plate(10.0, 10.0, n, n, kind=kind)
     thin = plate(kind, n)
     found = {}
     exact = np.array([13.468, 19.596, 24.270, 34.801, 34.801, 61.093]) * cases.THIN_PLATE
@@ -31,10 +31,10 @@ def errors(kind, n):
     exact = np.array([3.471, 8.507, 21.285, 27.199, 30.957, 54.19]) * cases.THIN_PLATE
     fixed = np.union1d(cases.across(mesh), of_nodes(mesh.node_sets["u0"], *range(6)))
     found["FV16 cantilevered thin plate"] = frequencies(thin, fixed, 6) / exact
-    taper = fm.mapped_shell(
+    taper = fm.shells.mapped_shell(
         lambda u, v: np.stack([10 * u, (v - 0.5) * (5 - 4 * u), 0 * u], axis=1), 2 * n, n, kind=kind
     )
-    membrane = fm.shell_body(taper, fm.ShellProperty(0.05, STEEL), name="membrane", units=SI)
+    membrane = fm.shell_body(taper, fm.shells.ShellProperty(0.05, STEEL), name="membrane", units=SI)
     fixed = np.union1d(cases.in_plane(taper), of_nodes(taper.node_sets["u0"], 0, 1))
     found["FV32 tapered membrane"] = frequencies(membrane, fixed, 6) / [44.623, 130.03, 162.70, 246.05, 379.90, 391.44]
     exact = cases.thick_plate_frequencies(10.0, 1.0, [(1, 1), (1, 2), (2, 1), (2, 2)], STEEL)
@@ -55,8 +55,8 @@ def cost(n):
     """
 
     def reduced(n_cells, told=print):
-        mesh = fm.flat_plate(1.0, 1.0, n_cells, n_cells)
-        root = fm.shell_interface(mesh, "root", fm.NodeSet("u0"))
+        mesh = fm.shells.flat_plate(1.0, 1.0, n_cells, n_cells)
+        root = fm.shells.shell_interface(mesh, "root", fm.selections.NodeSet("u0"))
         seconds = [time.perf_counter(), time.process_time()]
 
         def since(what):
@@ -66,7 +66,7 @@ def cost(n):
             seconds[:] = now
             return spent[1]
 
-        body = fm.shell_body(mesh, fm.ShellProperty(0.005, STEEL), name="plate", units=SI, interfaces=[root])
+        body = fm.shell_body(mesh, fm.shells.ShellProperty(0.005, STEEL), name="plate", units=SI, interfaces=[root])
         made = since(f"{body.n_dof} dofs: body")
         coupled = cms.couple(body)
         costs = []
@@ -90,9 +90,9 @@ def hemisphere(kind, n):
         phi, theta = np.pi / 2 * u, np.deg2rad(72) * v
         return 10 * np.stack([np.cos(theta) * np.cos(phi), np.cos(theta) * np.sin(phi), np.sin(theta)], axis=1)
 
-    mesh = fm.mapped_shell(surface, n, n, kind=kind)
+    mesh = fm.shells.mapped_shell(surface, n, n, kind=kind)
     material = fm.Material("m", E=6.825e7, nu=0.3, rho=1.0)
-    body = fm.shell_body(mesh, fm.ShellProperty(0.04, material), name="hemisphere", units=SI)
+    body = fm.shell_body(mesh, fm.shells.ShellProperty(0.04, material), name="hemisphere", units=SI)
     sets = mesh.node_sets
     a, b = (int(np.intersect1d(sets[s], sets["v0"])[0]) for s in ("u0", "u1"))
     fixed = np.unique(np.concatenate([of_nodes(sets["u0"], 1, 3, 5), of_nodes(sets["u1"], 0, 4, 5), [6 * a + 2]]))
@@ -108,9 +108,9 @@ def twisted_beam(kind):
         angle, y = np.pi / 2 * u, 1.1 * (v - 0.5)
         return np.stack([12 * u, y * np.cos(angle), y * np.sin(angle)], axis=1)
 
-    mesh = fm.mapped_shell(surface, 24, 4, kind=kind)
+    mesh = fm.shells.mapped_shell(surface, 24, 4, kind=kind)
     material = fm.Material("m", E=29e6, nu=0.22, rho=1.0)
-    body = fm.shell_body(mesh, fm.ShellProperty(0.32, material), name="beam", units=SI)
+    body = fm.shell_body(mesh, fm.shells.ShellProperty(0.32, material), name="beam", units=SI)
     tip = np.flatnonzero(np.abs(mesh.nodes - [12.0, 0.0, 0.0]).max(axis=1) < 1e-9)[0]
     f = np.zeros(body.n_dof)
     f[6 * tip + 2] = 1.0
@@ -121,8 +121,8 @@ def torsion(kind, n):
     """Torsional stiffness of a strip five times as wide as thick, n square cells across, over St Venant's."""
     b, t = 0.1, 0.02
     material = fm.Material("m", E=2e11, nu=0.0, rho=1.0)
-    mesh = fm.flat_plate(5 * b, b, 5 * n, n, kind=kind)
-    body = fm.shell_body(mesh, fm.ShellProperty(t, material), name="strip", units=SI)
+    mesh = fm.shells.flat_plate(5 * b, b, 5 * n, n, kind=kind)
+    body = fm.shell_body(mesh, fm.shells.ShellProperty(t, material), name="strip", units=SI)
     start, end = mesh.node_sets["u0"], mesh.node_sets["u1"]
     fixed = np.concatenate([of_nodes(start, 0, 1, 2, 3, 5), of_nodes(end, 2, 3)])
     turned = np.stack([mesh.nodes[end, 1] - b / 2, np.ones(len(end))], axis=1).ravel()
@@ -143,7 +143,7 @@ def choices():
     print(
         f"triangles {hemisphere('triangle', 8):7.3f} {hemisphere('triangle', 16):8.3f} {twisted_beam('triangle'):8.3f}"
     )
-    mesh = fm.flat_plate(10.0, 10.0, 16, 16)
+    mesh = fm.shells.flat_plate(10.0, 10.0, 16, 16)
     exact = np.array([13.468, 19.596, 24.270, 34.801, 34.801, 61.093]) * cases.THIN_PLATE
     print("worst of FV12 in %, 16 x 16: sides of the mass straight, parabolic")
     for kind in KINDS:
@@ -164,7 +164,7 @@ def choices():
 def stiffeners():
     """Print errors in % of the first six frequencies of ribbed plates against those with strips of shells."""
     upright, beside = (0.0, 0.0, ribs.HEIGHT), (0.0, -0.06, 0.0)
-    bar = fm.BeamProperty(fm.Rectangle(0.06, 0.008), STEEL, offset=(-0.03, 0.0))
+    bar = fm.beams.BeamProperty(fm.beams.Rectangle(0.06, 0.008), STEEL, offset=(-0.03, 0.0))
     cases = {
         "one rib": ((("x", 0.3),), upright, ribs.WIDTH, ribs.rib()),
         "four ribs that cross": ((("x", 0.15), ("x", 0.45), ("y", 0.3), ("y", 0.7)), upright, ribs.WIDTH, ribs.rib()),

@@ -31,9 +31,9 @@ from floatframe import (
     RigidBody,
     SphericalJoint,
     System,
-    UniversalJoint,
     integrate,
 )
+from floatframe.joints import UniversalJoint
 
 GRAVITY = Gravity((0.0, -9.81, 0.0))
 INERTIA = np.diag([1e-3, 0.01, 0.01])

@@ -2,7 +2,7 @@
 
 A slider-crank turns freely; spring and damper at its slider and the masses are sought so that the slider follows the
 motion of another one, whose numbers are not told. Both searches minimise the same number with L-BFGS-B; runs and
-processor time are counted. A run with gradient is one call of `ff.sensitivities`.
+processor time are counted. A run with gradient is one call of `ff.design.sensitivities`.
 """
 
 import time
@@ -28,7 +28,7 @@ def crank() -> ff.System:
     """Return the crank as it is at the beginning."""
     post = ff.Marker(ff.GROUND, position=(0.8, 0.1, 0.0))
     forces = [ff.Gravity((0, -9.81, 0)), ff.SpringDamper("spring", post, ff.Marker("slider"), 50.0, 3.0, 0.3)]
-    sensors = [ff.PlaceSensor("slider", ff.Marker("slider"))]
+    sensors = [ff.sensors.PlaceSensor("slider", ff.Marker("slider"))]
     return replace(slider_crank(angle=0.5, speed=6.0), forces=forces, sensors=sensors)
 
 
@@ -43,7 +43,7 @@ def scaled(factors: np.ndarray) -> ff.System:
 def slider(system: ff.System) -> np.ndarray:
     """Return the place of the slider over time."""
     motion = ff.integrate(system, ff.GeneralizedAlpha(0.8, tolerance=1e-11), **RUN)
-    return np.asarray(ff.measured(system, motion)["slider"].columns["x"])
+    return np.asarray(ff.sensors.measured(system, motion)["slider"].columns["x"])
 
 
 class Search:
@@ -67,7 +67,7 @@ class Search:
             gap = values - goal
             return float(WEIGHTS * (gap**2).mean()), 2 * WEIGHTS * gap / len(gap)
 
-        found = ff.sensitivities(system, {"missed": ("slider x", missed)}, PATHS, **RUN)
+        found = ff.design.sensitivities(system, {"missed": ("slider x", missed)}, PATHS, **RUN)
         return float(found.values[0]), found.gradient[0] * np.array([value_at(crank(), path) for path in PATHS])
 
 

@@ -20,18 +20,17 @@ from floatframe import (
     GROUND,
     FixedJoint,
     FlexibleBody,
-    FloatframeError,
     GeneralizedAlpha,
     Gravity,
     Marker,
-    PointOnLine,
     RevoluteJoint,
     RigidBody,
     SphericalJoint,
     System,
-    UniversalJoint,
     integrate,
 )
+from floatframe.errors import FloatframeError
+from floatframe.joints import PointOnLine, UniversalJoint
 
 ALLOWED = 0.01
 STEPS_PER_TURN = (7, 8, 10, 12, 16, 20, 30, 40, 60, 80, 120, 160, 240, 320, 480, 640)
@@ -79,9 +78,9 @@ def gyroscope_error(method, spin_of_step):
 
 def shaft(diameter):
     """Return a steel shaft of 0.3 m, of six beam elements and four modes."""
-    mesh = fm.straight_line((0, 0, 0), (0.3, 0, 0), 6)
-    ends = [fm.line_interface(mesh, name, fm.NodeIndices((k,))) for name, k in (("left", 0), ("right", 6))]
-    section = fm.BeamProperty(fm.Circle(diameter / 2), fm.Material("steel", E=2.1e11, nu=0.3, rho=7850.0))
+    mesh = fm.beams.straight_line((0, 0, 0), (0.3, 0, 0), 6)
+    ends = [fm.beams.line_interface(mesh, name, fm.beams.NodeIndices((k,))) for name, k in (("left", 0), ("right", 6))]
+    section = fm.beams.BeamProperty(fm.beams.Circle(diameter / 2), fm.Material("steel", E=2.1e11, nu=0.3, rho=7850.0))
     body = fm.beam_body(mesh, section, name="shaft", units=cms.unit_system("m-kg-s"), interfaces=ends)
     coupled = cms.couple(body)
     return cms.reduce(coupled, cms.craig_bampton(coupled, n_modes=4))

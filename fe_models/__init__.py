@@ -1,15 +1,5 @@
 """Finite element models of bodies: meshes, materials, elements, interfaces and loads."""
 
-import lazy_loader
+from fe_models.door import open_door
 
-# The public names are listed in __init__.pyi. A module is imported when one of its names is first used, and a function
-# checks its arguments (`at_door`).
-attribute, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
-
-
-def __getattr__(name: str) -> object:
-    found = attribute(name)
-    from fe_models.errors import ArgumentError
-    from fe_models.foundation.records import at_door
-
-    return at_door(__name__, name, found, ArgumentError)
+open_door(__name__, "fe_models.errors:ArgumentError")

@@ -1,6 +1,6 @@
 """Errors of this package: one root class, and leaves that also derive from `ValueError` or `RuntimeError`."""
 
-from fe_models.foundation.errors import ArgumentError, BodyError, FeModelsError, UnitsError
+from fe_models.foundation.errors import ArgumentError, BodyError, FeModelsError, TableError, UnitsError
 
 __all__ = [
     "ArgumentError",
@@ -15,6 +15,7 @@ __all__ = [
     "MeshingError",
     "SectionError",
     "ShellError",
+    "TableError",
     "UnitsError",
 ]
 

@@ -15,6 +15,7 @@ from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
+from fe_models.door import door_names
 from floatframe.engine.kernels.compiler.garbage import without_garbage_collection
 from tests.root import ROOT
 
@@ -80,13 +81,17 @@ def test_modules() -> dict[str, Path]:
 
 @cache
 def public_names(package: str) -> dict[str, str]:
-    """Return the module of each public name of a package that is imported when it is first used."""
+    """Return the module of each name that a package or namespace imports when it is first used."""
     path = modules().get(package)
-    stub = path.with_suffix(".pyi") if path else None
-    if stub is None or not stub.exists():
+    if path is None or not path.with_suffix(".pyi").exists():
         return {}
-    nodes = [node for node in tree_of(stub).body if isinstance(node, ast.ImportFrom)]
-    return {alias.name: f"{package}.{node.module}" for node in nodes for alias in node.names}
+    return {name: source for name, (source, _) in door_names(package).items()}
+
+
+def all_public_modules(package: str) -> set[str]:
+    """Return the modules of all public names of a package and of its namespaces."""
+    sources = set(public_names(package).values())
+    return sources.union(*(all_public_modules(source) for source in sources if public_names(source)))
 
 
 def imported_modules(path: Path) -> set[str]:
@@ -143,16 +148,24 @@ def used_modules(path: Path) -> set[str]:
             for words in NAMED.findall(node.value):
                 parts = words.split(".")
                 found |= {".".join(parts[:k]) for k in range(2, len(parts) + 1)}
+
+    def package_at(node: ast.AST) -> str | None:
+        """Return the package or namespace that an expression such as `ff.joints` stands for."""
+        if isinstance(node, ast.Name):
+            return packages.get(node.id)
+        outer = package_at(node.value) if isinstance(node, ast.Attribute) else None
+        inner = public_names(outer).get(node.attr, "") if outer and isinstance(node, ast.Attribute) else ""
+        return inner if public_names(inner) else None
+
     by_name = set()
     for node in nodes.get(ast.Attribute, ()):
-        if isinstance(node.value, ast.Name) and node.value.id in packages:
-            package = packages[node.value.id]
+        if package := package_at(node.value):
             inner = f"{package}.{node.attr}"
             found.add(inner if inner in known else public_names(package).get(node.attr, package))
             by_name.add(node.value)
-    for node in nodes.get(ast.Name, ()):
-        if node.id in packages and node not in by_name:
-            found |= set(public_names(packages[node.id]).values())
+    for node in (*nodes.get(ast.Name, ()), *nodes.get(ast.Attribute, ())):
+        if node not in by_name and (package := package_at(node)):
+            found |= all_public_modules(package)
     return found & known
 
 

@@ -9,18 +9,18 @@ import pytest
 import scipy.sparse as sp
 
 import cms
-import fe_models
 import floatframe as ff
 from fe_models.foundation.presentation import LONGEST_VALUE, MOST_ROWS, Summary, presented, text_of
 from tests.bodies import bar
+from tests.public_objects import public_objects
 from tests.synthetic import synthetic_reduced_body
 
 LONGEST, MOST_LINES = 2000, 30
 PUBLIC = {
-    cls: f"{package.__name__}.{name}"
-    for package in (fe_models, cms, ff)
-    for name in package.__all__
-    if inspect.isclass(cls := getattr(package, name)) and dataclasses.is_dataclass(cls)
+    each: name
+    for package in ("fe_models", "cms", "floatframe")
+    for name, each in public_objects(package).items()
+    if inspect.isclass(each) and dataclasses.is_dataclass(each)
 }
 
 

@@ -17,6 +17,7 @@ from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.records import MismatchError, Takes, checked_fields, conformed
 from fe_models.foundation.units import Units
 from tests.bodies import bar
+from tests.public_objects import public_objects
 
 
 class Stranger:
@@ -37,10 +38,10 @@ def is_made_or_called(subject):
 
 
 PUBLIC = [
-    pytest.param(getattr(package, name), id=f"{package.__name__}.{name}")
-    for package in (fe_models, cms, ff)
-    for name in package.__all__
-    if is_made_or_called(getattr(package, name)) and required(getattr(package, name))
+    pytest.param(each, id=name)
+    for package in ("fe_models", "cms", "floatframe")
+    for name, each in public_objects(package).items()
+    if is_made_or_called(each) and required(each)
 ]
 
 
@@ -65,7 +66,7 @@ def test_a_body_alone_stands_for_a_list_and_a_name_for_units():
     system = ff.System(block(), units="mm-t-s")
     assert [body.name for body in system.bodies] == ["block"]
     assert system.units.name == "mm-t-s"
-    with pytest.raises(fe_models.UnitsError, match="unknown unit system 'si'"):
+    with pytest.raises(fe_models.errors.UnitsError, match="unknown unit system 'si'"):
         ff.System(block(), units="si")
 
 
@@ -154,7 +155,7 @@ def test_another_kind_is_told(hint, value, words, wrong):
 
 
 @dataclass
-@checked_fields(ff.ModelError)
+@checked_fields(ff.errors.ModelError)
 class Inputs:
     """Annotations that look at a class, and those that look at contents."""
 
@@ -168,7 +169,7 @@ class Inputs:
 def test_inputs_of_a_class_that_was_taken_are_judged_by_their_contents_where_those_count():
     Inputs(2.0, ["a"], "a", 1, "mm-t-s")
     for name, value in {"names": ["a", 3], "choice": "c", "level": 3, "number": "2"}.items():
-        with pytest.raises(ff.ModelError, match=f"{name}: expected "):
+        with pytest.raises(ff.errors.ModelError, match=f"{name}: expected "):
             Inputs(**{name: value})
     assert Inputs(names="b").names == ("b",)
     with pytest.raises(ReportedError, match="unknown unit system"):

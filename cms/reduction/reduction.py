@@ -90,19 +90,19 @@ def reduce(
     stress
         Whether to keep the stress of the modes at the kept nodes and the stress points, if the body provides it.
     geometric
-        Whether to add the geometric stiffness of the unit loads (`cms.GeometricStiffness`). With it, a multibody system
-        stiffens the body by its spin, accelerations and interface loads. Default: True if the elements are known and it
-        needs at most 2 GB (`cms.modes.families.cost`); otherwise a warning and the provenance say that it is left out.
-        It costs a factorisation (unless `source` has one), the static solution of 12 + 6 n_interfaces loads, and one
-        pass over the elements. The static states of the unit loads (`unit_states`) may be given instead of True: they
-        need no further factorisation, and `frame` is then omitted.
+        Whether to add the geometric stiffness of the unit loads (`cms.body.GeometricStiffness`). With it, a multibody
+        system stiffens the body by its spin, accelerations and interface loads. Default: True if the elements are
+        known and it needs at most 2 GB (`cms.modes.families.cost`); otherwise a warning and the provenance say that
+        it is left out. It costs a factorisation (unless `source` has one), the static solution of 12 + 6 n_interfaces
+        loads, and one pass over the elements. The static states of the unit loads (`unit_states`) may be given instead
+        of True: they need no further factorisation, and `frame` is then omitted.
     quadratic
         Whether to add quadratic modes, the second-order displacement of every kept node (`quadratic_modes`), together
         with the geometric stiffness that supplies their inertia. They are meant for slender bodies and cost three
         static solutions per kept node.
     keep
         Nodes to keep with translations and rotations, in addition to surface and interfaces: numbers of the user's
-        mesh, names of sets, or positions [x, y, z] in mesh axes (`fe_models.keep_nodes`). Nodes of lines and point
+        mesh, names of sets, or positions [x, y, z] in mesh axes (`fe_models.body.keep_nodes`). Nodes of lines and point
         masses are always kept.
     recovery
         Tables of recovery rows to add (`ReducedBody.recovery`): motions, stress, forces in elements and at interfaces,

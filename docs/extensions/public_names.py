@@ -1,15 +1,16 @@
-"""API pages of all public names: one page a room of a package, made from the stubs (`__init__.pyi`) of the packages."""
+"""API pages of all public names: one page a namespace, made from the stubs of the packages and their namespaces."""
 
-import ast
 import importlib
 import inspect
 import re
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from sphinx.application import Sphinx
 
-ROOT = Path(__file__).resolve().parents[2]
+from fe_models.door import names_of, namespaces
+
 PACKAGES = {
     "fe_models": "what a finite element body is",
     "cms": "reduction, modal file, quality",
@@ -17,63 +18,37 @@ PACKAGES = {
 }
 
 
-def public_names(package: str) -> dict[str, str]:
-    """Return the public names of a package and the room of each, "" for the package itself."""
-    tree = ast.parse((ROOT / package / "__init__.pyi").read_text(encoding="utf-8"))
-    rooms = {}
-    for node in tree.body:
-        if isinstance(node, ast.ImportFrom) and node.module:
-            room = node.module
-            while room and not (ROOT / package / room.replace(".", "/")).is_dir():
-                room = room.rpartition(".")[0]
-            rooms |= {alias.asname or alias.name: room for alias in node.names}
-    return rooms
+def public_names(module: str) -> list[str]:
+    """Return the public names of a namespace, without the namespaces below it."""
+    names = [name for name in names_of(module) if not isinstance(thing(module, name), ModuleType)]
+    return sorted(names, key=str.lower)
 
 
-def names_from_below(package: str) -> dict[str, str]:
-    """Return the public names that a package imports from another package, with that package."""
+def thing(module: str, name: str) -> Any:
+    """Return what a namespace offers under a name; a function without the check of its arguments."""
+    found = getattr(importlib.import_module(module), name)
+    return inspect.unwrap(found) if inspect.isfunction(found) else found
+
+
+def names_from_below(module: str) -> dict[str, str]:
+    """Return the public names that a namespace takes from a package below, with their namespace there."""
     below: dict[int, str] = {}
-    for other in PACKAGES:
-        module = importlib.import_module(other)
-        if other == package:
-            return {
-                name: below[id(thing)] for name in public_names(package) if id(thing := getattr(module, name)) in below
-            }
-        below |= {id(getattr(module, name)): other for name in public_names(other)}
-    return {}
-
-
-def further_modules(package: str) -> list[str]:
-    """Return the rooms whose `__all__` is public by module path, in addition to the names of the package."""
-    return [name for name in FURTHER if name.split(".")[0] == package]
-
-
-#: used by module path, with their own `__all__`
-FURTHER = (
-    "fe_models.parts", "floatframe.components.drives", "floatframe.components.hydraulics",
-    "floatframe.components.mechanisms",
-)  # fmt: skip
+    for package in PACKAGES:
+        if module.split(".")[0] == package:
+            break
+        for other in namespaces(package):
+            below = {id(thing(other, name)): other for name in public_names(other)} | below
+    return {name: below[id(found)] for name in public_names(module) if id(found := thing(module, name)) in below}
 
 
 def write_pages(app: Sphinx) -> None:
-    """Write api/index.rst, and one page for each package and each room, into the source folder."""
+    """Write api/index.rst, and one page for each package and each namespace, into the source folder."""
     folder = Path(app.srcdir) / "api"
     pages = {"index": index_page()}
     for package, words in PACKAGES.items():
-        rooms: dict[str, list[str]] = {}
-        shared = names_from_below(package)
-        for name, room in public_names(package).items():
-            if name not in shared:
-                rooms.setdefault(room, []).append(name)
-        files = []
-        for room in sorted(rooms):
-            page = f"{package}.{room}" if room else f"{package}.top"
-            files.append(page)
-            pages[page] = room_page(package, room, sorted(rooms[room], key=str.lower))
-        for module in further_modules(package):
-            files.append(module)
-            pages[module] = module_page(module)
-        pages[package] = package_page(package, words, files, shared)
+        modules = list(namespaces(package))[1:]
+        pages[package] = package_page(package, words, modules)
+        pages |= {module: namespace_page(module) for module in modules}
     folder.mkdir(exist_ok=True)
     for old in folder.glob("*.rst"):
         if old.stem not in pages:
@@ -88,45 +63,39 @@ def index_page() -> str:
     """Return the page that links to the packages."""
     lines = [
         *heading("Names", "="),
-        "All public names, by package and room; names that are not listed here may change.",
+        "All public names, by package and namespace; names that are not listed here may change.",
         "",
     ]
     return "\n".join([*lines, ".. toctree::", "   :maxdepth: 2", "", *(f"   {package}" for package in PACKAGES), ""])
 
 
-def package_page(package: str, words: str, files: list[str], shared: dict[str, str]) -> str:
-    """Return the page of a package: its docstring, its rooms, and the names that it imports from another package."""
+def package_page(package: str, words: str, modules: list[str]) -> str:
+    """Return the page of a package: its docstring, its namespaces, and the names at its top."""
     lines = [*heading(f"{package}: {words}", "="), f".. automodule:: {package}", "   :no-members:", ""]
+    lines += [".. toctree::", "   :maxdepth: 1", "", *(f"   {name}" for name in modules), ""]
+    return "\n".join([*lines, *entries(package)])
+
+
+def namespace_page(module: str) -> str:
+    """Return the page of a namespace."""
+    return "\n".join([*heading(module, "="), first_line(module), "", *entries(module)])
+
+
+def entries(owner: str) -> list[str]:
+    """Return the table of names of a namespace and the entry of each; names from a package below are only linked."""
+    shared = names_from_below(owner)
+    names = [name for name in public_names(owner) if name not in shared]
+    lines = [f".. currentmodule:: {owner}", ""]
     if shared:
-        names = ", ".join(f":obj:`~{other}.{name}`" for name, other in sorted(shared.items()))
-        lines += [f"Also available here, and described in their own package: {names}.", ""]
-    return "\n".join([*lines, ".. toctree::", "   :maxdepth: 1", "", *(f"   {name}" for name in files), ""])
-
-
-def room_page(package: str, room: str, names: list[str]) -> str:
-    """Return the page of a room: a table of its public names, followed by the entry of each."""
-    title = f"{package}.{room}" if room else f"{package}, top level"
-    about = first_line(f"{package}.{room}" if room else package)
-    return "\n".join([*heading(title, "="), about, "", *entries(package, names)])
-
-
-def module_page(module: str) -> str:
-    """Return the page of a module with its own `__all__`, without the public names of its package."""
-    package = module.split(".")[0]
-    names = sorted(set(importlib.import_module(module).__all__) - set(public_names(package)), key=str.lower)
-    return "\n".join([*heading(module, "="), first_line(module), "", *entries(module, names)])
-
-
-def entries(owner: str, names: list[str]) -> list[str]:
-    """Return the table of names of a module and the entry of each."""
-    module = importlib.import_module(owner)
-    lines = [f".. currentmodule:: {owner}", "", ".. autosummary::", "   :nosignatures:", ""]
-    lines += [f"   {name}" for name in names] + [""]
+        links = ", ".join(f":obj:`~{other}.{name}`" for name, other in sorted(shared.items()))
+        lines += [f"Also available here, and described in their own package: {links}.", ""]
+    if names:
+        lines += [".. autosummary::", "   :nosignatures:", "", *(f"   {name}" for name in names), ""]
     for name in names:
-        thing = getattr(module, name)
-        if inspect.isclass(thing):
+        found = thing(owner, name)
+        if inspect.isclass(found):
             lines += [f".. autoclass:: {name}", "   :members:", ""]
-        elif callable(thing):
+        elif callable(found):
             lines += [f".. autofunction:: {name}", ""]
         else:
             lines += [f".. autodata:: {name}", "   :no-value:", ""]

@@ -63,7 +63,7 @@ def antenna() -> None:
         for part in ("petal", "strut"):
             cms.write(cms.reduce_job(folder / f"{part}.toml"), folder / f"{part}.h5")
         system, run = read_system(folder / "bare.toml")
-        motion = ff.kinematics(system, np.linspace(0.0, run.t_end, 41), elasticity=ff.quasi_static_bodies)
+        motion = ff.kinematics(system, np.linspace(0.0, run.t_end, 41), elasticity=ff.analyses.quasi_static_bodies)
         film = folder / "film.gif"
         animate(motion, drawn(system), film, speed=run.t_end / 4, fps=10, magnification=1.0, system=system)
         frames = [frame[..., :3] for frame in iio.imread(film)]
@@ -120,9 +120,9 @@ def still(name: str, make: Callable[[], tuple[ff.System, float, float]]) -> None
 
 def rod_of(length: float, *, height: float, width: float, young: float = 210e9, rho: float = 7850.0, n_modes: int = 4):
     """Return a reduced beam along x with a drawn surface, interfaces "start" and "end"."""
-    line = fm.straight_line((0, 0, 0), (length, 0, 0), 10)
-    ends = [fm.line_interface(line, end, fm.NodeSet(end)) for end in ("start", "end")]
-    section = fm.BeamProperty(fm.Rectangle(height, width), fm.Material("rod", young, 0.3, rho))
+    line = fm.beams.straight_line((0, 0, 0), (length, 0, 0), 10)
+    ends = [fm.beams.line_interface(line, end, fm.selections.NodeSet(end)) for end in ("start", "end")]
+    section = fm.beams.BeamProperty(fm.beams.Rectangle(height, width), fm.Material("rod", young, 0.3, rho))
     body = fm.beam_body(line, section, name="rod", units=fm.unit_system("m-kg-s"), interfaces=ends)
     body = fm.couple(body)
     return cms.reduce(body, cms.craig_bampton(body, n_modes=n_modes), frame=cms.TisserandFrame(), geometric=True)
@@ -251,7 +251,7 @@ def road_car() -> None:
         folder = Path(name)
         copy_machine("road-car", folder)
         cms.write(cms.reduce_job(folder / "body.toml"), folder / "body.h5")
-        content = read_parametric(folder / "rig.toml", ff.ModelError)
+        content = read_parametric(folder / "rig.toml", ff.errors.ModelError)
         changes: dict[str, Any] = {"height": 0.035, "is_rigid": False}
         for corner, (axle, side) in CORNERS.items():  # drawn wheels, without tyres
             place = RoadCar().axle(axle).point("centre", side).tolist()
@@ -329,8 +329,8 @@ def road_car_study(journal: Path | None = None) -> None:
         folder = Path(name)
         copy_machine("road-car", folder)
         cms.write(cms.reduce_job(folder / "body.toml"), folder / "body.h5")
-        design = ff.read_design(folder / "suspension_study.toml")
-        best = ff.optimize(design, journal=journal)
+        design = ff.design.read_design(folder / "suspension_study.toml")
+        best = ff.design.optimize(design, journal=journal)
         plot_history(best).savefig(HERE.parent / "road_car_study.png", dpi=70)
         after = {path: best.values[p.name] for p in design.parameters for path in p.paths}
         figure, axes = plt.subplots(1, 3, figsize=(10, 3), layout="constrained")

@@ -200,7 +200,7 @@ def report_mesh(
     Parameters
     ----------
     mesh
-        The mesh, of this package or of another library (`fe_models.as_mesh`).
+        The mesh, of this package or of another library (`fe_models.meshes.as_mesh`).
     materials
         One material, or one for each group of cells; None: no mass is computed, and density and modulus are not
         checked.

@@ -214,7 +214,7 @@ def _read(path: str | Path, convert: Callable[[RawMesh, Path, str], M]) -> M:
     if suffix in CAD_SUFFIXES:
         raise MeshError(
             f"{where}: this is a CAD geometry, which has to be meshed: a table [mesh_size] in a job, or "
-            f"fe_models.mesh_cad(path, fe_models.MeshSize(size), units=...)"
+            f"fe_models.files.mesh_cad(path, fe_models.files.MeshSize(size), units=...)"
         )
     if suffix not in MESH_FORMATS:
         raise MeshError(f"{where}: unknown suffix {quoted(suffix)}{nearest(suffix, MESH_FORMATS)}")

@@ -12,7 +12,10 @@ from cms.cli.console import guarded, output_path, print_table, say, stages, vect
 from cms.cli.outputs import PICTURES, TABLES, output_file, write_outputs
 
 if TYPE_CHECKING:
-    from floatframe.analyses import Equilibrium, LinearSystem, Locus, SystemModes
+    from floatframe.analyses.equilibrium import Equilibrium
+    from floatframe.analyses.linear.linearization import LinearSystem
+    from floatframe.analyses.linear.parameter_study import Locus
+    from floatframe.analyses.linear.system_modes import SystemModes
     from floatframe.model.system import System
     from floatframe.pictures.body_colors import BodyColor
 
@@ -51,7 +54,7 @@ def check_command(
     from cms.cli.verdicts.check import print_records
     from floatframe.analyses.system_check import check_system
     from floatframe.files.system_file.read_system import read_system
-    from floatframe.integrators import has_fixed_steps
+    from floatframe.integrators.registry import has_fixed_steps
 
     model, run = read_system(system, changes_of(set_values))
     tell_left_out(model)
@@ -79,7 +82,9 @@ def static_command(
 
     Example: floatframe static crane.toml
     """
-    from floatframe.analyses import linearize, static_equilibrium, system_modes
+    from floatframe.analyses.equilibrium import static_equilibrium
+    from floatframe.analyses.linear.linearization import linearize
+    from floatframe.analyses.linear.system_modes import system_modes
     from floatframe.engine.compiling.system import compiled_system
     from floatframe.errors import ModelError
 
@@ -165,7 +170,7 @@ def modes_command(
     Example: floatframe modes rotor.toml --speed 100 --axis z
     """
     from fe_models.foundation.words import nearest
-    from floatframe.analyses import system_modes
+    from floatframe.analyses.linear.system_modes import system_modes
     from floatframe.errors import ModelError
     from floatframe.pictures.body_colors import BODY_COLORS
 
@@ -235,7 +240,7 @@ def campbell_command(
 
     Example: floatframe campbell rotor.toml --speeds 0:200:21 --out bearing --out "tip.x" -o rotor.csv
     """
-    from floatframe.analyses import campbell
+    from floatframe.analyses.linear.parameter_study import campbell
     from floatframe.analyses.linear.plots import campbell_figure
     from floatframe.errors import ModelError
 
@@ -318,7 +323,8 @@ def linearized(
     """Return the system linearised about rest, or about a steady rotation."""
     import numpy as np
 
-    from floatframe.analyses import linearize, steady_rotation
+    from floatframe.analyses.equilibrium import steady_rotation
+    from floatframe.analyses.linear.linearization import linearize
     from floatframe.analyses.steady.turning_drives import turning_with
     from floatframe.model.checked_values import unit_vector
 

@@ -94,7 +94,7 @@ def run_command(
     from floatframe.files.cosimulation.coupled_motion import co_simulate
     from floatframe.files.system_file.read_system import read_system
     from floatframe.files.system_file.run_section import required_run
-    from floatframe.integrators import in_formulation
+    from floatframe.integrators.relative import in_formulation
     from floatframe.simulation.integrate import integrate
 
     kind = read_toml(system, SystemFileError).get("kind", "system")

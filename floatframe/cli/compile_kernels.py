@@ -15,7 +15,11 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numba.core.event import install_recorder
 
-from floatframe import EnergyMomentum, GeneralizedAlpha, RigidBody, System, integrate
+from floatframe.integrators.energy_momentum import EnergyMomentum
+from floatframe.integrators.generalized_alpha import GeneralizedAlpha
+from floatframe.model.bodies.rigid_body import RigidBody
+from floatframe.model.system import System
+from floatframe.simulation.integrate import integrate
 
 __all__ = ["PARTS", "main"]
 
@@ -38,7 +42,7 @@ def make_schemes() -> None:
 
 def make_recursion() -> None:
     """Compute its equations of motion by recursion."""
-    from floatframe import relative_model
+    from floatframe.engine.tree.recursive import relative_model
 
     model = relative_model(block())
     model.mass_matrix(model.positions()[0])

@@ -12,8 +12,8 @@ from cms.cli.outputs import PICTURES, TABLES, output_file, write_outputs
 from floatframe.cli.analyses import Axis, Center, Formulation, Speed, SystemArgument, linearized, read_in_formulation
 
 if TYPE_CHECKING:
-    from floatframe.analyses import LinearSystem
     from floatframe.analyses.linear.frequency_response import FrequencyResponse
+    from floatframe.analyses.linear.linearization import LinearSystem
 
 __all__ = ["linearize_command", "response_command"]
 
@@ -144,7 +144,7 @@ def print_left_out(linear: "LinearSystem") -> None:
 def band_of(text: str, linear: "LinearSystem", seconds: float) -> tuple[float, float]:
     """Return a band "from:to" in Hz; by default from a third of the lowest to three times the highest mode."""
     from fe_models.foundation.words import shortened
-    from floatframe.analyses import system_modes
+    from floatframe.analyses.linear.system_modes import system_modes
     from floatframe.errors import ModelError
 
     if not text:

@@ -59,7 +59,7 @@ def view_command(
     if rest and not is_system:
         raise ResultsError(f"--rest: {file} is a motion; the equilibrium is that of a system file (.toml)")
     if is_system:
-        from floatframe.analyses import system_modes
+        from floatframe.analyses.linear.system_modes import system_modes
 
         if sensors:
             raise ResultsError(f"--sensor: plots are those of a motion; expected results (.h5), got {file}")

@@ -17,7 +17,7 @@ from floatframe.model.elements.smooth import atan2
 from floatframe.model.elements.unit_names import outputs_in
 from floatframe.model.functions.time_functions import TimeFunction, constant
 
-__all__ = ["ELEMENTS", "LiftingSurface"]
+__all__ = ["LiftingSurface"]
 
 ELEMENTS = {"lifting-surface": "floatframe.components.aerodynamics:LiftingSurface"}
 

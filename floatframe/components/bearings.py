@@ -29,7 +29,7 @@ from floatframe.model.elements import Element, ElementLaw, Placed
 from floatframe.model.elements.pairs import axial_motion, direction_of, inner_product, vector_product
 from floatframe.model.elements.unit_names import outputs_in
 
-__all__ = ["ELEMENTS", "Bearing"]
+__all__ = ["Bearing"]
 
 ELEMENTS = {"bearing": "floatframe.components.bearings:Bearing"}
 

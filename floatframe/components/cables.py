@@ -21,7 +21,7 @@ from floatframe.model.elements.pairs import line_between
 from floatframe.model.elements.unit_names import outputs_in
 from floatframe.model.shapes.drawn import Stretched
 
-__all__ = ["ELEMENTS", "Cable"]
+__all__ = ["Cable"]
 
 ELEMENTS = {"cable": "floatframe.components.cables:Cable"}
 

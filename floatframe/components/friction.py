@@ -26,7 +26,7 @@ from floatframe.model.elements.pairs import add_axial_force, add_torque, axial_m
 from floatframe.model.elements.smooth import absolute
 from floatframe.model.elements.unit_names import in_units, outputs_in
 
-__all__ = ["ELEMENTS", "BristleFriction"]
+__all__ = ["BristleFriction"]
 
 ELEMENTS = {"bristles": "floatframe.components.friction:BristleFriction"}
 

@@ -31,8 +31,9 @@ from floatframe.engine.initial_conditions.mass_positivity import indefinite_mass
 from floatframe.engine.kernels.memory import Memory, Rows
 from floatframe.engine.kernels.work import Work, new_work
 from floatframe.errors import ConvergenceError, ModelError, ResultsError
-from floatframe.integrators import CLASSES, has_fixed_steps, has_second_order, in_formulation, made_integrator
 from floatframe.integrators.integrator import Failure, Integrator, joined_rows
+from floatframe.integrators.registry import CLASSES, has_fixed_steps, has_second_order, made_integrator
+from floatframe.integrators.relative import in_formulation
 from floatframe.model.checked_values import number
 from floatframe.model.forces import UserForce
 from floatframe.model.state import State
@@ -234,7 +235,7 @@ def require_no_units(system: System) -> None:
         names = ", ".join(unit.name for unit in system.fmus)
         raise ModelError(
             f"system {system.name!r} is coupled to units of other programs (fmus: {names}): use floatframe run, or "
-            "floatframe.co_simulate in place of integrate; such a run cannot be resumed"
+            "floatframe.files.co_simulate in place of integrate; such a run cannot be resumed"
         )
 
 

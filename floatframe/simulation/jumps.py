@@ -16,8 +16,8 @@ from floatframe.engine.compiling.time_laws import functions_of_time, parts_of_ti
 from floatframe.engine.kernels.memory import Memory, Rows
 from floatframe.engine.kernels.work import Work
 from floatframe.errors import ModelError
-from floatframe.integrators import has_fixed_steps
 from floatframe.integrators.integrator import Failure, Integrator
+from floatframe.integrators.registry import has_fixed_steps
 from floatframe.model.functions.time_switches import OfTime, switch_times
 from floatframe.model.system import System
 from floatframe.simulation.event_steps import EventWatch

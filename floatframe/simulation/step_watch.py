@@ -51,9 +51,9 @@ from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.kernels.memory import Memory
 from floatframe.engine.kernels.work import Work, new_work
 from floatframe.errors import FloatframeError, ResultsError
-from floatframe.integrators import has_fixed_steps
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha
 from floatframe.integrators.integrator import Integrator, has_divided_steps, started_anew
+from floatframe.integrators.registry import has_fixed_steps
 from floatframe.integrators.relative import RelativeGeneralizedAlpha
 from floatframe.model.rotations import (
     euler_parameter_product,

@@ -190,9 +190,9 @@ def damping_of(case: BodyCase, reduced, U):
     """Return the damping matrix: that of the body over the fields, and what was asked for."""
     K_q, M_q = np.diag(np.diag(reduced.K)), np.diag(np.diag(reduced.M))
     D = np.zeros_like(K_q) if case.body.D is None else U.T @ case.body.D.toarray() @ U
-    if isinstance(case.damping, cms.RayleighDamping):
+    if isinstance(case.damping, cms.reduction.RayleighDamping):
         D = D + case.damping.alpha * M_q + case.damping.beta * K_q
-    elif isinstance(case.damping, cms.ModalDamping):
+    elif isinstance(case.damping, cms.reduction.ModalDamping):
         D = D + 2 * case.damping.ratio * np.sqrt(K_q @ M_q)
     return D
 
@@ -202,7 +202,7 @@ def frame_defects(case: BodyCase, dense: DenseBody, U, M, R_B, lengths, reduced)
     if isinstance(case.frame, cms.NodalFrame):
         moved = dense.mean[case.frame.at] @ U
         return {"frame": relative(moved * np.r_[1, 1, 1, lengths[3:]][:, None], 0 * moved, np.abs(reduced.Phi).max())}
-    if isinstance(case.frame, cms.BuckensFrame):
+    if isinstance(case.frame, cms.reduction.BuckensFrame):
         return {}
     if case.set_name in OTHER_MASS:
         return {}
@@ -228,7 +228,7 @@ def file_defects(reduced, folder: Path) -> dict[str, float]:
     back = cms.read(folder / "body.h5")
     same = all(np.array_equal(getattr(back, name), getattr(reduced, name)) for name in ("M", "K", "D", "Phi", "nodes"))
     other = next(name for name in ("mm-t-s", "m-kg-s") if name != reduced.units.name)
-    moved = cms.convert_units(reduced, other)
+    moved = cms.body.convert_units(reduced, other)
     time = moved.units.time / reduced.units.time
     mass = moved.units.mass / reduced.units.mass
     return {

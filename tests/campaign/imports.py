@@ -214,7 +214,7 @@ def written(files: tuple[tuple[str, bytes], ...], rng: np.random.Generator, fold
 
 def matrix_case(seed: int, folder: Path) -> Verdict:
     """Read a set of matrix files of which one is damaged."""
-    from fe_models import read_matrices
+    from fe_models.files import read_matrices
     from fe_models.foundation.errors import ReportedError
 
     rng = np.random.default_rng([9, seed])

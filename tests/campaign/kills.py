@@ -38,7 +38,8 @@ def system_of(number: int) -> Any:
 def kill_case(seed: int, folder: Path) -> Verdict:
     """Kill a run in a forked process, look at what it left, go on with it, and compare bit for bit."""
     import floatframe.simulation.integrate as integration
-    from floatframe import GeneralizedAlpha, integrate, read_results, resume
+    from floatframe import GeneralizedAlpha, integrate, read_results
+    from floatframe.simulation import resume
 
     integration.SEGMENT_SECONDS = 0.0
     logging.getLogger("floatframe").setLevel(logging.ERROR)  # notes on the range of linear frames, a hundred times

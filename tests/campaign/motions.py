@@ -42,7 +42,7 @@ def motion_verdict(case: MotionCase) -> Verdict:
     try:
         try:
             motion, notes = run(case, 1)
-        except ff.FloatframeError as error:
+        except ff.errors.FloatframeError as error:
             return Verdict(REFUSED, f"{type(error).__name__}: {str(error)[:300]}; {case.words}")
         reference = reference_of(case)
         if reference is None:
@@ -58,7 +58,7 @@ def motion_verdict(case: MotionCase) -> Verdict:
         if growth > CHAOS:
             return Verdict(ACCEPTED, f"chaotic: {told}, growth {growth:.2g}; {case.words}")
         return Verdict(WRONG, f"silent: {told}, growth {growth:.2g}; {case.words}")
-    except ff.FloatframeError as error:
+    except ff.errors.FloatframeError as error:
         return Verdict(TRACEBACK, f"the reference failed: {type(error).__name__}: {str(error)[:300]}; {case.words}")
     finally:
         logging.disable(logging.NOTSET)
@@ -94,7 +94,7 @@ def joined(parts: list[np.ndarray]) -> np.ndarray:
     return np.concatenate([parts[0], *(part[1:] for part in parts[1:])])
 
 
-def run(case: MotionCase, finer_by: int, watch: str = "stop") -> tuple[Samples, tuple[ff.ValidityNote, ...]]:
+def run(case: MotionCase, finer_by: int, watch: str = "stop") -> tuple[Samples, tuple[ff.results.ValidityNote, ...]]:
     """Return the motion of a case with steps divided by a number, at the times that are compared, and its notes."""
     every = max(1, case.n_steps // SAMPLES) * finer_by
     h, n = case.h / finer_by, case.n_steps * finer_by
@@ -119,7 +119,7 @@ def reference_of(case: MotionCase) -> Samples | None:
         formulation = "relative" if formulation == "absolute" else "absolute"
         try:
             made, _ = run(finer(case, formulation), finer_by, "off")
-        except ff.ConvergenceError:
+        except ff.errors.ConvergenceError:
             made = None
         if made is not None and last is not None and difference(last, made) <= AGREED:
             return made
@@ -149,7 +149,7 @@ def growth_of(case: MotionCase) -> float:
     """Return by how much a difference of the start, a small part of the velocities of the motion, grows in the run."""
     small, rng = 1e-6, np.random.default_rng(1)
     finest = finer(case, "absolute")
-    start = ff.consistent_state(case.system).state
+    start = ff.analyses.consistent_state(case.system).state
     first = ff.integrate(case.system, finest.method, case.n_steps * case.h, case.h / 32, state=start, output_every=32)
     u = start.u.copy()
     for body in first.head.bodies:

@@ -63,9 +63,9 @@ def random_body(seed: int) -> BodyCase:
     if name == "guyan" and len(body.interfaces) == 1:  # its columns are the rigid motions
         name = "craig-bampton"
     ports = [each.name for each in body.interfaces if each.kind != "nodes"]
-    frames = [None, cms.TisserandFrame(), cms.BuckensFrame(), *(cms.NodalFrame(port) for port in ports)]
+    frames = [None, cms.TisserandFrame(), cms.reduction.BuckensFrame(), *(cms.NodalFrame(port) for port in ports)]
     omega = float(np.sqrt(material.E / material.rho) / size)
-    dampings = [None, cms.RayleighDamping(0.03 * omega, 0.01 / omega), cms.ModalDamping(0.02)]
+    dampings = [None, cms.reduction.RayleighDamping(0.03 * omega, 0.01 / omega), cms.reduction.ModalDamping(0.02)]
     n_modes = 0 if name == "guyan" else int(rng.integers(1, 9))
     frame, damping = (each[int(rng.integers(len(each)))] for each in (frames, dampings))
     words = (
@@ -105,7 +105,7 @@ def solid(rng, kind, material, placed, size, units: Units):
 def shell(rng, kind, material, placed, size, units: Units):
     """Return a plate."""
     n, m = rng.integers(2, 5, size=2)
-    mesh = fm.mapped_shell(lambda u, v: np.stack([u, 0.7 * v, 0 * u], axis=1), int(n) + 1, int(m), kind=kind)
+    mesh = fm.shells.mapped_shell(lambda u, v: np.stack([u, 0.7 * v, 0 * u], axis=1), int(n) + 1, int(m), kind=kind)
     edges = [np.flatnonzero(mesh.nodes[:, 0] == x) for x in (0.0, mesh.nodes[:, 0].max())]
     inner = np.flatnonzero((mesh.nodes[:, 0] > 0.1) & (mesh.nodes[:, 0] < 0.9))
     nodes = size * (mesh.nodes @ np.linalg.qr(rng.normal(size=(3, 3)))[0].T + rng.normal(size=3))
@@ -117,7 +117,11 @@ def shell(rng, kind, material, placed, size, units: Units):
         interface_of(rng, "right", k := str(rng.choice(list(sides))), nodes, sides[k], size),
     ]
     body = fm.shell_body(
-        mesh, fm.ShellProperty(t, material), name="shell", units=units, interfaces=ports[: int(rng.integers(1, 3))]
+        mesh,
+        fm.shells.ShellProperty(t, material),
+        name="shell",
+        units=units,
+        interfaces=ports[: int(rng.integers(1, 3))],
     )
     return body, material.rho * t * 0.7 * size**2
 
@@ -130,8 +134,8 @@ def frame_of_beams(rng, kind, material, placed, size, units: Units):
     nodes = placed(points)
     lines = np.array([*([k, k + 1] for k in range(n - 1)), [n // 2, n], [n, n + 1]])
     d = size * 10 ** rng.uniform(-2, -1)
-    section = fm.Circle(d / 2) if rng.random() < 0.5 else fm.Rectangle(d, 1.5 * d)
-    area = np.pi * d**2 / 4 if isinstance(section, fm.Circle) else 1.5 * d**2
+    section = fm.beams.Circle(d / 2) if rng.random() < 0.5 else fm.beams.Rectangle(d, 1.5 * d)
+    area = np.pi * d**2 / 4 if isinstance(section, fm.beams.Circle) else 1.5 * d**2
     length = np.linalg.norm(np.diff(nodes[lines], axis=1)[:, 0], axis=1).sum()
     beams = material.rho * area * length
     heavy = [
@@ -147,7 +151,7 @@ def frame_of_beams(rng, kind, material, placed, size, units: Units):
         members = np.array([n, n + 1])
         ends[1] = Interface("right", "rigid", members, nodes[members].mean(axis=0) + 0.1 * size)
     body = fm.beam_body(
-        LineMesh(nodes, lines), fm.BeamProperty(section, material), name="frame", units=units,
+        LineMesh(nodes, lines), fm.beams.BeamProperty(section, material), name="frame", units=units,
         interfaces=ends[: int(rng.integers(1, 3))], point_masses=heavy, springs=springs,
     )  # fmt: skip
     return body, beams + sum(each.mass for each in heavy)

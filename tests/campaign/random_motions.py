@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 import cms
+import fe_models
 import floatframe as ff
 from fe_models.foundation.units import Units, unit_system
 from floatframe.integrators.integrator import Integrator
@@ -190,23 +191,23 @@ def joint_of(build, kind, name, near, far, axis, other, motions):
         case "prismatic":
             return ff.PrismaticJoint(name, near, far, axis=axis, motions=motions)
         case "cylindrical":
-            return ff.CylindricalJoint(name, near, far, axis=axis)
+            return ff.joints.CylindricalJoint(name, near, far, axis=axis)
         case "screw":
-            return ff.ScrewJoint(name, near, far, axis=axis, lead=build.of(0.7, length=1))
+            return ff.joints.ScrewJoint(name, near, far, axis=axis, lead=build.of(0.7, length=1))
         case "universal":
-            return ff.UniversalJoint(name, near, far, axis=axis, axis_b=other)
+            return ff.joints.UniversalJoint(name, near, far, axis=axis, axis_b=other)
         case "planar":
-            return ff.PlanarJoint(name, near, far, axis=axis)
+            return ff.joints.PlanarJoint(name, near, far, axis=axis)
         case "spherical":
             return ff.SphericalJoint(name, near, far)
         case "constant-velocity":
-            return ff.ConstantVelocityJoint(name, near, far, axis=axis)
+            return ff.joints.ConstantVelocityJoint(name, near, far, axis=axis)
         case "distance":
-            return ff.DistanceJoint(name, near, far)
+            return ff.joints.DistanceJoint(name, near, far)
         case "point-on-line":
-            return ff.PointOnLine(name, near, far, axis=axis)
+            return ff.joints.PointOnLine(name, near, far, axis=axis)
         case "point-on-plane":
-            return ff.PointOnPlane(name, near, far, axis=axis)
+            return ff.joints.PointOnPlane(name, near, far, axis=axis)
         case "fixed":
             return ff.FixedJoint(name, near, far)
     return None
@@ -217,14 +218,14 @@ def beam(build: Builder, k: int) -> cms.ReducedBody:
     first = 2 * np.pi * min(build.periods, 10.0) / build.h
     EI = (first / 3.516) ** 2  # of 1 kg/m and 1 m
     EI = max(EI, 40.0)  # does not bend under its weight
-    line = cms.BeamLine(
+    line = fe_models.beams.BeamLine(
         build.of(1.0, length=1), build.of(1.0, mass=1, length=-1), build.of(1e3 * EI, mass=1, length=1, time=-2),
         build.of(EI, mass=1, length=3, time=-2), build.of(1.5 * EI, mass=1, length=3, time=-2),
         build.of(EI, mass=1, length=3, time=-2), build.of(1e-3, mass=1, length=1), build.of(1e-3, mass=1, length=1),
     )  # fmt: skip
-    damping = cms.ModalDamping(0.02) if build.rng.random() < 0.5 else None
+    damping = cms.reduction.ModalDamping(0.02) if build.rng.random() < 0.5 else None
     frame = cms.NodalFrame("start") if build.rng.random() < 0.3 else None
-    return cms.beam_from_assumed_modes(
+    return cms.reduction.beam_from_assumed_modes(
         line, name=f"b{k}", units=build.units, n_axial=1, n_bending=2, n_torsion=1, frame=frame, damping=damping
     )
 
@@ -259,7 +260,7 @@ def add_forces(build: Builder) -> None:
         K = scale @ build.of(K, mass=1, time=-2) @ scale
         triad = build.poses[b][0]
         build.forces.append(
-            ff.Bushing(
+            ff.forces.Bushing(
                 "mount", build.place(-1, far, triad), build.place(b, point, np.eye(3)), K,
                 damping=0.1 / build.of(omega, time=-1) * K,
             )
@@ -297,7 +298,7 @@ def add_forces(build: Builder) -> None:
         x = 1.0 if key.startswith("angle") else build.of(1.0, length=1)
         build.forces.append(
             ff.UserForce(
-                "control", {"x": ff.JointCoordinate(joint, key)}, {"x": "-F*(x/L) - F*0.2*x_dot/L*T - F*e"},
+                "control", {"x": ff.joints.JointCoordinate(joint, key)}, {"x": "-F*(x/L) - F*0.2*x_dot/L*T - F*e"},
                 {"e": "(x/L - e)/(0.1*T)"}, {"e": 0.0},
                 {"F": build.of(5.0, **of), "L": x, "T": build.of(1.0, time=1)},
             )
@@ -312,19 +313,21 @@ def close_loop(build: Builder) -> None:
     here = build.at(b, point) - build.origin
     if build.rng.random() < 0.5:
         build.joints.append(
-            ff.DistanceJoint(
+            ff.joints.DistanceJoint(
                 "loop", build.place(-1, here + np.array([0.4, 0.5, 0.3]), np.eye(3)), build.place(b, point, np.eye(3))
             )
         )
     else:
         axis = build.rng.normal(size=3)
         build.joints.append(
-            ff.PointOnPlane("loop", build.place(-1, here, np.eye(3)), build.place(b, point, np.eye(3)), axis=axis)
+            ff.joints.PointOnPlane(
+                "loop", build.place(-1, here, np.eye(3)), build.place(b, point, np.eye(3)), axis=axis
+            )
         )
     build.words.append("loop")
 
 
-def add_events(build: Builder) -> list[ff.Event]:
+def add_events(build: Builder) -> list[ff.simulation.Event]:
     """Return events that switch a force off and on, or none."""
     names = [force.name for force in build.forces if isinstance(force, ff.PointForce | ff.SpringDamper | ff.JointForce)]
     if not names or build.rng.random() < 0.75:
@@ -333,8 +336,8 @@ def add_events(build: Builder) -> list[ff.Event]:
     build.words.append(f"events switch {name}")
     off = float(build.rng.uniform(0.1, 0.5))
     return [
-        ff.Event("off", at=build.of(off, time=1), switch_off=(name,)),
-        ff.Event("on", at=build.of(off + 5.5 * build.h, time=1), switch_on=(name,)),
+        ff.simulation.Event("off", at=build.of(off, time=1), switch_off=(name,)),
+        ff.simulation.Event("on", at=build.of(off + 5.5 * build.h, time=1), switch_on=(name,)),
     ]
 
 
@@ -346,12 +349,12 @@ def random_method(rng: np.random.Generator, *, has_events: bool, periods: float)
     if kind < 0.6:
         return ff.GeneralizedAlpha(rho), formulation, f"generalized-alpha {rho:g}"
     if kind < 0.7:
-        return ff.hht(-0.1), formulation, "hht"
+        return ff.integrators.hht(-0.1), formulation, "hht"
     if kind < 0.75 and periods < MOST_PERIODS:
         return ff.GeneralizedAlpha(rho, error_tolerance=1e-5), formulation, f"generalized-alpha {rho:g} with error 1e-5"
     if kind < 0.9 or has_events:
-        return ff.EnergyMomentum(), "absolute", "energy-momentum"
-    return ff.EnergyDecaying(rho), "absolute", f"energy-decaying {rho:g}"
+        return ff.integrators.EnergyMomentum(), "absolute", "energy-momentum"
+    return ff.integrators.EnergyDecaying(rho), "absolute", f"energy-decaying {rho:g}"
 
 
 def finer(case: MotionCase, formulation: str) -> MotionCase:

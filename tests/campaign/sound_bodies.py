@@ -102,7 +102,7 @@ def sound_body(seed: int) -> SoundBody:
     n_modes = min(n_modes, max(1, (body.n_dof - len(body.b) - 12) // 2))
     options: dict[str, Any] = {"n_modes": n_modes} if name in COUNTED else {}
     if name == "benfield-hruda":
-        options["loads"] = [cms.point_load(body.interfaces[0].name, mass=draw.si(1.0, mass=1))]
+        options["loads"] = [cms.modes.point_load(body.interfaces[0].name, mass=draw.si(1.0, mass=1))]
     modes = MODE_SETS[name](body, **options)
     if body.load_cases and draw.chance(0.5):
         modes = with_load_cases(modes, body)
@@ -120,9 +120,9 @@ def sound_body(seed: int) -> SoundBody:
     words = f"{kind} of {body.n_dof} dofs in {body.units.name}, {name}, {made.n_q} modes, {made.frame.kind} frame"
     if draw.chance(0.25):
         try:
-            made = cms.convert_frame(made, frame_of(draw, body) or cms.TisserandFrame())
+            made = cms.reduction.convert_frame(made, frame_of(draw, body) or cms.TisserandFrame())
             words += f" carried to {made.frame.kind}"
-        except cms.BodyError:
+        except cms.errors.BodyError:
             pass
     stress = made.stress is not None or made.point_stress is not None
     asked = ReductionOptions(damping, frame, stress, geometric, is_quadratic, recovery)
@@ -138,7 +138,7 @@ def frame_of(draw: Draw, body: FEBody) -> Any:
     if kind == 1:
         return cms.TisserandFrame(axes=axes)
     if kind == 2:
-        return cms.BuckensFrame(axes=axes)
+        return cms.reduction.BuckensFrame(axes=axes)
     return cms.NodalFrame(body.interfaces[0].name, axes=axes)
 
 
@@ -203,14 +203,14 @@ def solid(draw: Draw, turn: Rotation, offset: np.ndarray) -> FEBody:
 def shell(draw: Draw, turn: Rotation, offset: np.ndarray) -> FEBody:
     rng = draw.rng
     length, width = draw.si(1.0, length=1), draw.si(rng.uniform(0.3, 1.0), length=1)
-    mesh = fm.flat_plate(length, width, 4, 3, kind=str(rng.choice(("quad", "triangle"))))
+    mesh = fm.shells.flat_plate(length, width, 4, 3, kind=str(rng.choice(("quad", "triangle"))))
     x = mesh.nodes[:, 0] / length
     ends = [np.flatnonzero(x < x.min() + 0.26), np.flatnonzero(x > x.max() - 0.26)]  # two rows of nodes each
     bent = np.array(mesh.nodes)
     bent[:, 2] += 0.2 * bent[:, 0] ** 2 / length
     mesh = replace(mesh, nodes=turn.apply(bent) + offset)
     joints = interfaces_of(draw, mesh.nodes, ends, ("rigid", "distributing"))
-    t = fm.ShellProperty(draw.si(rng.uniform(0.003, 0.03), length=1), draw.material())
+    t = fm.shells.ShellProperty(draw.si(rng.uniform(0.003, 0.03), length=1), draw.material())
     return fm.shell_body(mesh, t, name="shell", units=draw.units, interfaces=joints)
 
 
@@ -219,13 +219,15 @@ def beams(draw: Draw, turn: Rotation, offset: np.ndarray) -> FEBody:
     size = draw.si(1.0, length=1)
     points = np.array([(0, 0, 0), (0.5, 0.1, 0), (1, 0, 0.1), (0.5, 0.1, 0.5), (1.2, 0.4, 0.4)]) * size
     nodes = turn.apply(points + 0.05 * size * rng.normal(size=points.shape)) + offset
-    mesh = fm.LineMesh(nodes, [(0, 1), (1, 2), (1, 3), (2, 4), (3, 4)])
-    section = fm.Rectangle(*(draw.si(rng.uniform(0.01, 0.06, 2), length=1)))
-    joints = [fm.line_interface(mesh, name, fm.NodeIndices((k,))) for name, k in (("left", 0), ("right", 2))]
+    mesh = fm.beams.LineMesh(nodes, [(0, 1), (1, 2), (1, 3), (2, 4), (3, 4)])
+    section = fm.beams.Rectangle(*(draw.si(rng.uniform(0.01, 0.06, 2), length=1)))
+    joints = [
+        fm.beams.line_interface(mesh, name, fm.beams.NodeIndices((k,))) for name, k in (("left", 0), ("right", 2))
+    ]
     body = fm.beam_body(
-        mesh, fm.BeamProperty(section, draw.material()), name="frame", units=draw.units, interfaces=joints
+        mesh, fm.beams.BeamProperty(section, draw.material()), name="frame", units=draw.units, interfaces=joints
     )
-    return fm.section_points(body, [0, 3]) if draw.chance(0.5) else body
+    return fm.beams.section_points(body, [0, 3]) if draw.chance(0.5) else body
 
 
 def mixed(draw: Draw, turn: Rotation, offset: np.ndarray) -> FEBody:
@@ -233,12 +235,12 @@ def mixed(draw: Draw, turn: Rotation, offset: np.ndarray) -> FEBody:
     block = solid(draw, turn, offset)
     end = block.interface("right")
     along = turn.apply([1.0, 0.2, 0.0]) * (block.length or 1.0) / 2
-    mesh = fm.LineMesh([end.reference, end.reference + along / 2, end.reference + along], [(0, 1), (1, 2)])
-    joints = [fm.line_interface(mesh, name, fm.NodeIndices((k,))) for name, k in (("root", 0), ("tip", 2))]
+    mesh = fm.beams.LineMesh([end.reference, end.reference + along / 2, end.reference + along], [(0, 1), (1, 2)])
+    joints = [fm.beams.line_interface(mesh, name, fm.beams.NodeIndices((k,))) for name, k in (("root", 0), ("tip", 2))]
     side = (block.length or 1.0) * draw.rng.uniform(0.02, 0.06)
     stick = fm.beam_body(
         mesh,
-        fm.BeamProperty(fm.Rectangle(side, side), draw.material()),
+        fm.beams.BeamProperty(fm.beams.Rectangle(side, side), draw.material()),
         name="stick",
         units=draw.units,
         interfaces=joints,

@@ -15,7 +15,7 @@ SEED = 18  #: tetrahedra, a rigid and a distributing interface, a nodal frame
 
 @pytest.fixture(scope="module")
 def case():
-    return replace(random_body(SEED), damping=cms.RayleighDamping(0.1, 0.1))
+    return replace(random_body(SEED), damping=cms.reduction.RayleighDamping(0.1, 0.1))
 
 
 @pytest.fixture(scope="module")

@@ -20,7 +20,7 @@ def test_stress_that_is_rounding_alone_is_judged_alike_in_all_units(seed):
     """Rows of the middle surface of a plate, which has no stress where it bends."""
     body = sound_body(seed).reduced
     systems = ("m-kg-s", "mm-t-s", "in-slinch-s")
-    found = [check_recovery_forces(cms.convert_units(body, units)).value for units in systems]
+    found = [check_recovery_forces(cms.body.convert_units(body, units)).value for units in systems]
     assert max(found) < 1e-6
     assert_allclose(found, found[0], rtol=1e-6)
     table = body.recovery["all"]

@@ -99,7 +99,7 @@ def test_the_file_of_a_held_body_says_so_in_a_newer_version(reduced, tmp_path):
     again = cms.read(tmp_path / "held.h5")
     assert again.is_held
     assert again.frame.kind == "held"
-    free = cms.reduce(body := cms.couple(bar(nx=3, kind="hexahedron")), cms.guyan(body), geometric=False)
+    free = cms.reduce(body := cms.couple(bar(nx=3, kind="hexahedron")), cms.modes.guyan(body), geometric=False)
     free = replace(free, numbering=Numbering(), kept=None)  # the mesh has sets, which older readers do not know
     cms.write(free, tmp_path / "free.h5")
     assert read_version(tmp_path / "free.h5") == 2  # what older readers know
@@ -118,12 +118,12 @@ def test_a_floating_frame_refuses_it(reduced):
 
 def test_frames_of_free_and_held_bodies_are_not_exchanged(held, reduced):
     with pytest.raises(BodyError, match=r"its frame is the ground: omit the frame"):
-        cms.reduce(held, cms.guyan(held), frame=TisserandFrame())
+        cms.reduce(held, cms.modes.guyan(held), frame=TisserandFrame())
     body = cms.couple(bar(nx=3, kind="hexahedron"))
     with pytest.raises(BodyError, match=r"is free; a HeldFrame is for a body that is held"):
-        cms.reduce(body, cms.guyan(body), frame=HeldFrame())
+        cms.reduce(body, cms.modes.guyan(body), frame=HeldFrame())
     with pytest.raises(BodyError, match=r"reduce it again with or without its supports"):
-        cms.convert_frame(reduced, TisserandFrame())
+        cms.reduction.convert_frame(reduced, TisserandFrame())
 
 
 def test_sets_of_a_held_body_are_compared(held):

@@ -347,17 +347,17 @@ def far_body(kind, offset):
         made = couple(fm.solid_body(mesh, STEEL, name="far", units=SI, interfaces=[joint]))
         return made if kind == "solid" else replace(made, element_model=None, recovery=None, stress_points=None)
     if kind == "shell":
-        mesh = fm.flat_plate(1.0, 0.5, 4, 2, kind="quad")
+        mesh = fm.shells.flat_plate(1.0, 0.5, 4, 2, kind="quad")
         mesh = replace(mesh, nodes=mesh.nodes + offset)
         own = np.flatnonzero(mesh.nodes[:, 0] == mesh.nodes[:, 0].min())
         joint = Interface("left", "rigid", own, mesh.nodes[own].mean(axis=0))
         return couple(fm.shell_body(
-            mesh, fm.ShellProperty(0.0625, STEEL), name="far", units=SI, interfaces=[joint]
+            mesh, fm.shells.ShellProperty(0.0625, STEEL), name="far", units=SI, interfaces=[joint]
         ))  # fmt: skip
     points = np.array([(0, 0, 0), (0.5, 0.25, 0), (1, 0, 0.25), (0.5, 0.5, 0.5)]) + offset
-    mesh = fm.LineMesh(points, [(0, 1), (1, 2), (1, 3)])
-    joint = fm.line_interface(mesh, "left", fm.NodeIndices((0,)))
-    section = fm.BeamProperty(fm.Rectangle(0.125, 0.0625), STEEL)
+    mesh = fm.beams.LineMesh(points, [(0, 1), (1, 2), (1, 3)])
+    joint = fm.beams.line_interface(mesh, "left", fm.beams.NodeIndices((0,)))
+    section = fm.beams.BeamProperty(fm.beams.Rectangle(0.125, 0.0625), STEEL)
     made = couple(fm.beam_body(mesh, section, name="far", units=SI, interfaces=[joint]))
     if kind == "planar":
         return fm.planar(made)

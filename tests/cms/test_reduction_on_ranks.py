@@ -49,7 +49,7 @@ def test_the_check_of_a_reduction_is_that_of_one_process():
 
 @pytest.mark.parametrize("size", [2, 3])
 @pytest.mark.parametrize("kind", ["rigid", "distributing", "nodes"])
-@pytest.mark.parametrize("frame", [cms.NodalFrame("left"), cms.TisserandFrame(), cms.BuckensFrame()])
+@pytest.mark.parametrize("frame", [cms.NodalFrame("left"), cms.TisserandFrame(), cms.reduction.BuckensFrame()])
 def test_the_reduced_body_is_that_of_one_process(size, kind, frame):
     one, spread = pair(size, kind)
     sets = [craig_bampton_ir(body, n_modes=8) for body in (one, spread)]

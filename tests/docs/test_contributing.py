@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 import cms
 import fe_models
-from fe_models.files import MESH_FORMATS
+from fe_models.files.read_mesh import MESH_FORMATS
 from tests.bodies import bar
 from tests.root import ROOT
 
@@ -29,7 +29,7 @@ def test_the_mode_set_that_is_shown_is_statically_complete():
     body = cms.couple(bar(nx=3))
     modes = shown("mode set")["static_modes_only"](body)
     span = np.linalg.qr(modes.columns)[0]
-    expected = cms.craig_bampton_ir(body, n_modes=0).columns
+    expected = cms.modes.craig_bampton_ir(body, n_modes=0).columns
     assert_allclose(span @ (span.T @ expected), expected, rtol=0, atol=1e-9 * np.abs(expected).max())
 
 
@@ -43,7 +43,7 @@ def test_the_importer_that_is_shown_reads_and_refuses(tmp_path, monkeypatch):
     )
     assert_allclose(body.M.sum(), 3 * 7850 / 6, rtol=1e-12)
     file.write_text("v 0 0\n")
-    with pytest.raises(fe_models.MeshError, match="line 1: expected v x y z"):
+    with pytest.raises(fe_models.errors.MeshError, match="line 1: expected v x y z"):
         fe_models.read_mesh(file)
 
 

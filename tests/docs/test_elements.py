@@ -68,9 +68,9 @@ def test_the_mount_is_as_stiff_as_the_closed_form_says(by_file):
     system, _ = by_file
     rest = ff.static_equilibrium(system)
     assert_allclose(rest.state.r[0, 2], -M * 9.81 / K_0, rtol=1e-9)
-    push = ff.Channel("push", ff.Marker("engine"), (0, 0, 1))
-    place = ff.PlaceSensor("place", ff.Marker("engine"), "position")
-    linear = ff.linearize(system, rest, inputs=[push], outputs=[ff.Column(place, "z")])
+    push = ff.sensors.Channel("push", ff.Marker("engine"), (0, 0, 1))
+    place = ff.sensors.PlaceSensor("place", ff.Marker("engine"), "position")
+    linear = ff.linearize(system, rest, inputs=[push], outputs=[ff.analyses.Column(place, "z")])
     f = np.array([0.3, 3.0, 30.0])
     s = 2j * np.pi * f
     exact = 1 / (K_0 + K_1 * s * T / (1 + s * T) + M * s**2)

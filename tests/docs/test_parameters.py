@@ -1,12 +1,13 @@
 """Parameters of public functions and fields of public data classes stand in the section Parameters of the docstring."""
 
 import dataclasses
-import importlib
 import inspect
 import re
 from typing import Any
 
 import pytest
+
+from tests.public_objects import public_objects
 
 PACKAGES = ("fe_models", "cms", "floatframe")
 
@@ -21,8 +22,7 @@ def documented(function: Any) -> set[str]:
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_public_functions_document_every_parameter(package):
-    module = importlib.import_module(package)
-    functions = {name: getattr(module, name) for name in module.__all__ if inspect.isfunction(getattr(module, name))}
+    functions = {name: each for name, each in public_objects(package).items() if inspect.isfunction(each)}
     assert len(functions) > 30
     missing = {
         name: left
@@ -34,9 +34,8 @@ def test_public_functions_document_every_parameter(package):
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_public_data_classes_document_every_field(package):
-    module = importlib.import_module(package)
-    named = {name: getattr(module, name) for name in module.__all__}
-    classes = {name: each for name, each in named.items() if inspect.isclass(each) and dataclasses.is_dataclass(each)}
+    named = public_objects(package).items()
+    classes = {name: each for name, each in named if inspect.isclass(each) and dataclasses.is_dataclass(each)}
     assert len(classes) > 30
     missing = {
         name: left

@@ -33,21 +33,21 @@ IN_MM_T_S = {
 @pytest.fixture(scope="module")
 def motions():
     """Return names of the same motion of a flexible pendulum in m-kg-s and in mm-t-s."""
-    line = fm.straight_line((0, 0, 0), (0.5, 0, 0), 4)
-    ends = [fm.line_interface(line, name, fm.NodeSet(name)) for name in ("start", "end")]
-    section = fm.BeamProperty(fm.Rectangle(0.004, 0.01), fm.Material("steel", 210e9, 0.3, 7850.0))
+    line = fm.beams.straight_line((0, 0, 0), (0.5, 0, 0), 4)
+    ends = [fm.beams.line_interface(line, name, fm.selections.NodeSet(name)) for name in ("start", "end")]
+    section = fm.beams.BeamProperty(fm.beams.Rectangle(0.004, 0.01), fm.Material("steel", 210e9, 0.3, 7850.0))
     body = cms.couple(fm.beam_body(line, section, name="rod", units=fm.unit_system("m-kg-s"), interfaces=ends))
     reduced = cms.reduce(body, cms.craig_bampton(body, n_modes=1), frame=cms.TisserandFrame())
 
     def moved(reduced, length):
         pin = ff.RevoluteJoint("pin", ff.GROUND, ff.Marker("rod", "start"), axis=(0, 1, 0))
-        tip = ff.PlaceSensor("tip", ff.Marker("rod", "end"))
+        tip = ff.sensors.PlaceSensor("tip", ff.Marker("rod", "end"))
         gravity = ff.Gravity((0.5 * length, 0.2 * length, -9.81 * length))
         system = ff.System([ff.FlexibleBody("rod", reduced)], [pin], [gravity], reduced.units, sensors=[tip])
         motion = ff.integrate(system, ff.GeneralizedAlpha(0.8), t_end=0.05, h=1e-3, output_every=5)
         return {"ff": ff, "motion": motion, "system": system, "reduced": reduced}
 
-    return moved(reduced, 1.0), moved(cms.convert_units(reduced, "mm-t-s"), 1e3)
+    return moved(reduced, 1.0), moved(cms.body.convert_units(reduced, "mm-t-s"), 1e3)
 
 
 @pytest.mark.parametrize(("expression", "shape", "unit"), ROWS, ids=[row[0].strip("`") for row in ROWS])

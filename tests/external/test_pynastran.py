@@ -68,12 +68,12 @@ def test_pynastran_reads_exported_superelements(tmp_path):
 
     body = reduced_bar()
     model = interface_model(body)
-    cms.export_body(body, tmp_path / "bar.op4", to="nastran-op4", units="m-kg-s")
+    cms.exchange.export_body(body, tmp_path / "bar.op4", to="nastran-op4", units="m-kg-s")
     subprocess.run([PYTHON, "-c", READ, tmp_path / "bar.op4", tmp_path / "bar.npz"], check=True)
     with np.load(tmp_path / "bar.npz") as theirs:
         for name, matrix in {"KXX": model.K, "MXX": model.M, "BXX": model.D, "PX": model.loads}.items():
             assert_array_equal(theirs[name], matrix)
-    cms.export_body(body, tmp_path / "dmig.bdf", to="nastran-dmig", units="m-kg-s")
+    cms.exchange.export_body(body, tmp_path / "dmig.bdf", to="nastran-dmig", units="m-kg-s")
     subprocess.run([PYTHON, "-c", READ_DMIG, tmp_path / "dmig.bdf", tmp_path / "dmig.npz"], check=True)
     with np.load(tmp_path / "dmig.npz") as theirs:
         rows = [(k + 1, c + 1) for k in range(2) for c in range(6)] + [(1000001 + k, 0) for k in range(3)]

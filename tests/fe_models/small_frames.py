@@ -7,17 +7,17 @@ import fe_models as fm
 
 STEEL = fm.Material("steel", E=2.1e11, nu=0.3, rho=7850.0)
 SI = cms.unit_system("m-kg-s")
-RECTANGLE = fm.Rectangle(0.02, 0.03)
+RECTANGLE = fm.beams.Rectangle(0.02, 0.03)
 
 
 def straight(n=8, section=RECTANGLE, length=1.0, *, interfaces=(), kind="rigid", material=STEEL, **options):
     """A straight beam along x of n elements; interfaces at "start" and "end" as asked for."""
-    mesh = fm.straight_line((0, 0, 0), (length, 0, 0), n)
-    ends = [fm.line_interface(mesh, name, fm.NodeSet(name), kind=kind) for name in interfaces]
+    mesh = fm.beams.straight_line((0, 0, 0), (length, 0, 0), n)
+    ends = [fm.beams.line_interface(mesh, name, fm.selections.NodeSet(name), kind=kind) for name in interfaces]
     keys = ("point_masses", "springs", "links")
     attached = {key: options.pop(key) for key in keys if key in options}
     return fm.beam_body(
-        mesh, fm.BeamProperty(section, material, **options), name="beam", units=SI, interfaces=ends, **attached
+        mesh, fm.beams.BeamProperty(section, material, **options), name="beam", units=SI, interfaces=ends, **attached
     )
 
 
@@ -27,14 +27,14 @@ def space_frame(seed=0):
     nodes = rng.uniform(-1, 1, (6, 3))
     lines = np.array([(0, 1), (1, 2), (2, 3), (3, 0), (0, 2), (1, 3)])
     shapes = [
-        fm.Circle(0.03),
-        fm.Tube(0.03, 0.004),
-        fm.Rectangle(0.03, 0.05),
-        fm.BoxSection(0.05, 0.08, 0.004, 0.006),
-        fm.ISection(0.1, 0.2, 0.006, 0.01),
-        fm.GeneralSection(1e-3, 2e-7, 3e-7, 1e-7, 8e-4, 7e-4, (0.02, -0.01)),
+        fm.beams.Circle(0.03),
+        fm.beams.Tube(0.03, 0.004),
+        fm.beams.Rectangle(0.03, 0.05),
+        fm.beams.BoxSection(0.05, 0.08, 0.004, 0.006),
+        fm.beams.ISection(0.1, 0.2, 0.006, 0.01),
+        fm.beams.GeneralSection(1e-3, 2e-7, 3e-7, 1e-7, 8e-4, 7e-4, (0.02, -0.01)),
     ]
-    mesh = fm.LineMesh(
+    mesh = fm.beams.LineMesh(
         nodes,
         lines,
         line_sets={str(k): np.array([k]) for k in range(6)},
@@ -42,7 +42,7 @@ def space_frame(seed=0):
         orientations=rng.normal(size=(6, 3)),
     )
     properties = {
-        str(k): fm.BeamProperty(
+        str(k): fm.beams.BeamProperty(
             shape, STEEL, offset=tuple(rng.uniform(-0.02, 0.02, 2)), added_mass=float(k), rotary_inertia=k != 3
         )
         for k, shape in enumerate(shapes)
@@ -53,9 +53,9 @@ def space_frame(seed=0):
         properties,
         name="frame",
         units=SI,
-        point_masses=[fm.PointMass(4, 3.0, B @ B.T, rng.normal(size=3)), fm.PointMass(2, 1.0, 0.1)],
-        springs=[fm.Spring((3, 4), 1e5 * np.ones(6), damping=10 * np.ones(6))],
-        links=[fm.RigidLink(1, (5,))],
+        point_masses=[fm.beams.PointMass(4, 3.0, B @ B.T, rng.normal(size=3)), fm.beams.PointMass(2, 1.0, 0.1)],
+        springs=[fm.beams.Spring((3, 4), 1e5 * np.ones(6), damping=10 * np.ones(6))],
+        links=[fm.beams.RigidLink(1, (5,))],
     )
 
 

@@ -15,8 +15,8 @@ KINDS = ("quad", "triangle")
 
 def plate(kind="quad", n=8, a=10.0, b=10.0, t=0.05, *, n_b=None, material=STEEL, **options):
     """A rectangle in the x-y plane as a body."""
-    mesh = fm.flat_plate(a, b, n, n_b or n, kind=kind)
-    return fm.shell_body(mesh, fm.ShellProperty(t, material), name="plate", units=SI, **options)
+    mesh = fm.shells.flat_plate(a, b, n, n_b or n, kind=kind)
+    return fm.shell_body(mesh, fm.shells.ShellProperty(t, material), name="plate", units=SI, **options)
 
 
 def distorted(mesh, amount=0.25, seed=3, warp=0.0):

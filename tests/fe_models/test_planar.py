@@ -51,8 +51,8 @@ def test_planar_beam_has_the_mass_and_inertia_of_the_beam_in_space(spatial):
 
 def test_interface_with_three_dofs_turns_with_its_node(spatial):
     """The marker of the second interface has all six motions: slope of the deflection about z, nothing out of plane."""
-    reduced = cms.reduce(fm.planar(spatial), cms.guyan(fm.planar(spatial)), frame=cms.NodalFrame("start"))
-    full = cms.reduce(spatial, cms.guyan(spatial), frame=cms.NodalFrame("start"))
+    reduced = cms.reduce(fm.planar(spatial), cms.modes.guyan(fm.planar(spatial)), frame=cms.NodalFrame("start"))
+    full = cms.reduce(spatial, cms.modes.guyan(spatial), frame=cms.NodalFrame("start"))
     Psi = reduced.interface("end").Psi
     assert_allclose(Psi[2:5], 0, rtol=0, atol=1e-12 * np.abs(Psi).max())
     slopes = {round(abs(rz / uy), 6) for uy, rz in Psi[[1, 5]].T if abs(uy) > 1e-9}
@@ -61,7 +61,7 @@ def test_interface_with_three_dofs_turns_with_its_node(spatial):
 
 
 def test_loads_keep_their_resultants(spatial):
-    load = fm.gravity_load(spatial, "weight", (1.0, 2.0, 3.0))
+    load = fm.loads.gravity_load(spatial, "weight", (1.0, 2.0, 3.0))
     flat = fm.planar(spatial.with_load_cases(load))
     resultant = rigid_motion_of_dofs(flat.nodes, flat.dofs).T @ flat.load_cases[0].f
     assert_allclose(resultant, rigid_motion_of_dofs(spatial.nodes, spatial.dofs).T @ load.f, rtol=0, atol=1e-9)
@@ -70,12 +70,12 @@ def test_loads_keep_their_resultants(spatial):
 @pytest.mark.parametrize("name", ["craig-bampton-ir", "herting", "rubin", "craig-chang", "unrestrained-attachment"])
 def test_columns_out_of_the_plane_are_dropped_and_not_made_of_rounding(spatial, name):
     """Six boundary dofs in the plane: 3 deformations, 3 of inertia relief, 4 modes; the bob makes everything uneven."""
-    mesh = fm.straight_line((0, 0, 0), (1, 0, 0), 8)
-    ends = [fm.line_interface(mesh, end, fm.NodeSet(end)) for end in ("start", "end")]
-    bob = [fm.PointMass(8, 2.0, 0.01)]
+    mesh = fm.beams.straight_line((0, 0, 0), (1, 0, 0), 8)
+    ends = [fm.beams.line_interface(mesh, end, fm.selections.NodeSet(end)) for end in ("start", "end")]
+    bob = [fm.beams.PointMass(8, 2.0, 0.01)]
     body = fm.beam_body(
         mesh,
-        fm.BeamProperty(fm.Tube(0.02, 0.003), STEEL),
+        fm.beams.BeamProperty(fm.beams.Tube(0.02, 0.003), STEEL),
         name="b",
         units=spatial.units,
         interfaces=ends,
@@ -101,10 +101,10 @@ def test_planar_refuses_what_it_cannot_do(spatial):
         fm.planar(straight(2, interfaces=("start",)))
     with pytest.raises(BodyError, match="expected axis 0, 1 or 2"):
         fm.planar(spatial, normal=3)
-    mesh = fm.LineMesh([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1), (0, 2)])
-    spread = fm.line_interface(mesh, "all", fm.NodeIndices((0, 1, 2)), kind="distributing")
+    mesh = fm.beams.LineMesh([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1), (0, 2)])
+    spread = fm.beams.line_interface(mesh, "all", fm.beams.NodeIndices((0, 1, 2)), kind="distributing")
     body = fm.beam_body(
-        mesh, fm.BeamProperty(fm.Circle(0.01), STEEL), name="b", units=spatial.units, interfaces=[spread]
+        mesh, fm.beams.BeamProperty(fm.beams.Circle(0.01), STEEL), name="b", units=spatial.units, interfaces=[spread]
     )
     with pytest.raises(BodyError, match="distributing interfaces"):
         fm.planar(cms.couple(body))

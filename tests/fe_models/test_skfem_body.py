@@ -5,9 +5,12 @@ import skfem
 from numpy.testing import assert_allclose, assert_array_equal
 from skfem.helpers import ddot, dot, eye, sym_grad, trace
 
-from fe_models import FaceGroup, Material, NodeCloud, Plane, as_mesh, body_from_skfem, rigid_interface, solid_body
+from fe_models import Material, rigid_interface, solid_body
 from fe_models.errors import BodyError, MeshError
+from fe_models.files import body_from_skfem
 from fe_models.foundation.units import unit_system
+from fe_models.meshes import NodeCloud, as_mesh
+from fe_models.selections import FaceGroup, Plane
 
 SI = unit_system("m-kg-s")
 STEEL = Material("steel", E=2.1e11, nu=0.3, rho=7850.0)

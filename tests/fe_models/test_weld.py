@@ -16,16 +16,18 @@ WIDTH, HEIGHT = 0.05, 0.07
 
 
 def line(start, end, n, name, places, **options):
-    mesh = fm.straight_line(start, end, n)
-    ends = [fm.line_interface(mesh, label, fm.NodeSet(at)) for label, at in places.items()]
-    item = fm.BeamProperty(fm.Rectangle(WIDTH, HEIGHT), STEEL, **options)
+    mesh = fm.beams.straight_line(start, end, n)
+    ends = [fm.beams.line_interface(mesh, label, fm.selections.NodeSet(at)) for label, at in places.items()]
+    item = fm.beams.BeamProperty(fm.beams.Rectangle(WIDTH, HEIGHT), STEEL, **options)
     return cms.couple(fm.beam_body(mesh, item, name=name, units=SI, interfaces=ends))
 
 
 def solid_bar(length, kind):
     mesh = bodies.box_mesh(8, 2, 2, length, WIDTH, HEIGHT, "hexahedron20")
     make = {"rigid": fm.rigid_interface, "distributing": fm.distributing_interface}[kind]
-    ends = [make(mesh, name, fm.Plane((x, 0, 0), (1, 0, 0))) for name, x in (("left", 0.0), ("right", length))]
+    ends = [
+        make(mesh, name, fm.selections.Plane((x, 0, 0), (1, 0, 0))) for name, x in (("left", 0.0), ("right", length))
+    ]
     return cms.couple(fm.solid_body(mesh, STEEL, name="bar", units=SI, interfaces=ends))
 
 
@@ -33,7 +35,7 @@ def test_a_beam_welded_from_two_is_the_beam_in_one_piece():
     first = line((0, 0, 0), (0.4, 0, 0), 4, "first", {"near": "start", "middle": "end"})
     second = line((0.4, 0, 0), (1, 0, 0), 6, "second", {"middle": "start", "far": "end"})
     welded = fm.weld([first, second], [(("first", "middle"), ("second", "middle"))], name="whole")
-    whole = straight(10, fm.Rectangle(WIDTH, HEIGHT))
+    whole = straight(10, fm.beams.Rectangle(WIDTH, HEIGHT))
     assert [interface.name for interface in welded.interfaces] == ["near", "far"]
     assert welded.n_dof == whole.n_dof
     assert_allclose(supported_frequencies(welded, [], 20)[6:], supported_frequencies(whole, [], 20)[6:], rtol=1e-9)
@@ -77,10 +79,10 @@ def test_solid_and_beam_in_line_swing_like_a_beam_alone(kind):
     bar = solid_bar(half, kind)
     body = fm.weld([bar, beam], [(("bar", "right"), ("beam", "root"))], name="mixed")
     modes = eigenmodes(body.K, body.M, n_modes=12)
-    alone = supported_frequencies(straight(24, fm.Rectangle(WIDTH, HEIGHT)), [], 12)[6:]
+    alone = supported_frequencies(straight(24, fm.beams.Rectangle(WIDTH, HEIGHT)), [], 12)[6:]
     assert_allclose(np.sqrt(modes.omega2[6:9]) / (2 * np.pi), alone[:3], rtol=1.5e-2)
     reduced = cms.reduce(body, cms.craig_bampton(body, n_modes=6), frame=cms.NodalFrame("left"))
-    clamped = supported_frequencies(straight(24, fm.Rectangle(WIDTH, HEIGHT)), np.arange(6), 4)
+    clamped = supported_frequencies(straight(24, fm.beams.Rectangle(WIDTH, HEIGHT)), np.arange(6), 4)
     assert_allclose(reduced.frequencies[:2], clamped[:2], rtol=2e-2)
     m = STEEL.rho * WIDTH * HEIGHT
     assert_allclose(reduced.moments.m, m, rtol=1e-9)
@@ -104,7 +106,7 @@ def test_either_side_of_a_joint_may_be_distributing():
 
 
 def test_stress_points_of_the_parts_stay_with_them():
-    first = fm.section_points(line((0, 0, 0), (1, 0, 0), 2, "first", {"a": "start", "b": "end"}), [1])
+    first = fm.beams.section_points(line((0, 0, 0), (1, 0, 0), 2, "first", {"a": "start", "b": "end"}), [1])
     second = line((1, 0, 0), (1, 1, 0), 2, "second", {"c": "start"})
     body = fm.weld([second, first], [(("first", "b"), ("second", "c"))], name="whole")
     points = body.stress_points

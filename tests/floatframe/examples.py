@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from floatframe import GROUND, Marker, RevoluteJoint, RigidBody, SphericalJoint, System, UniversalJoint
+from floatframe import GROUND, Marker, RevoluteJoint, RigidBody, SphericalJoint, System
 from floatframe.components.mechanisms.rods import slender_inertia
+from floatframe.joints import UniversalJoint
 
 CRANK = """
 [system]

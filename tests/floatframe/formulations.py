@@ -71,7 +71,8 @@ EXCEPTIONS: dict[str, str] = {
 def take_relative() -> None:
     """Make the relative formulation that of all that is not given one."""
     import floatframe.simulation.integrate as integration
-    from floatframe import linearize, static_equilibrium, steady_rotation
+    from floatframe import linearize, static_equilibrium
+    from floatframe.analyses import steady_rotation
     from floatframe.integrators.generalized_alpha import GeneralizedAlpha
 
     for function in (linearize, static_equilibrium, steady_rotation):

@@ -12,24 +12,7 @@ import numpy as np
 from cms.body.modal_file.file import convert_units
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.units import Dimensions, Units, unit_system
-from floatframe import (
-    AxialDistance,
-    BodyLoad,
-    Bushing,
-    CoordinateCoupler,
-    FlexibleBody,
-    Gravity,
-    JointForce,
-    Marker,
-    PointDistance,
-    PointForce,
-    RigidBody,
-    RollingDisc,
-    ScrewJoint,
-    SphereContact,
-    SpringDamper,
-    System,
-)
+from floatframe import FlexibleBody, Gravity, JointForce, Marker, PointForce, RigidBody, SpringDamper, System
 from floatframe.components.aerodynamics import LiftingSurface
 from floatframe.components.bearings import Bearing
 from floatframe.components.cables import Cable
@@ -55,6 +38,8 @@ from floatframe.components.wheels import BrushTyre, LinearTyre, MagicFormulaTyre
 from floatframe.components.wheels.roads.road import Grip
 from floatframe.components.wheels.tyre_file import TyreProperties
 from floatframe.engine.compiling.placing import placed_bodies
+from floatframe.forces import BodyLoad, Bushing, SphereContact
+from floatframe.joints import AxialDistance, CoordinateCoupler, PointDistance, RollingDisc, ScrewJoint
 from floatframe.model.bodies.ground import GROUND
 from floatframe.model.bodies.markers import body_name
 from floatframe.model.functions.time_functions import TimeFunction

@@ -8,23 +8,22 @@ from typer.testing import CliRunner
 
 from floatframe import (
     GROUND,
-    ConvergenceError,
     FlexibleBody,
     GeneralizedAlpha,
     Gravity,
     JointForce,
     Marker,
-    ModelError,
     RevoluteJoint,
     RigidBody,
     SphericalJoint,
     System,
-    consistent_state,
     integrate,
 )
+from floatframe.analyses import consistent_state
 from floatframe.cli.app import app
 from floatframe.components.mechanisms import slider_crank
 from floatframe.engine.compiling.system import compiled_system
+from floatframe.errors import ConvergenceError, ModelError
 from floatframe.model.functions.time_functions import polynomial_of_time
 from floatframe.simulation.step_advice import step_advice
 from tests.floatframe.examples import CRANK, TURN, parallelogram

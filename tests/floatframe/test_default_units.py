@@ -14,7 +14,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 from fe_models.foundation.units import LENGTH, RATE, SPEED, TIME, Dimensions, Quantity, unit_system
 from floatframe import (
     GROUND,
-    ConstantOrientation,
     GeneralizedAlpha,
     Gravity,
     JointForce,
@@ -23,15 +22,14 @@ from floatframe import (
     PrismaticJoint,
     RevoluteJoint,
     RigidBody,
-    RollingDisc,
-    ScrewJoint,
-    SphereContact,
     System,
     integrate,
 )
 from floatframe.components import clearances, drives, hydraulics, wheels
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.kernels.records import leaves
+from floatframe.forces import SphereContact
+from floatframe.joints import ConstantOrientation, RollingDisc, ScrewJoint
 
 UNITS = ("m-kg-s", "mm-t-s", "mm-kg-ms", "in-slinch-s")
 A, B = Marker(GROUND, position=(0.0, 0.0, 0.0)), Marker("b", position=(0.0, 0.0, 0.0))

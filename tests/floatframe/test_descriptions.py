@@ -5,8 +5,8 @@ import re
 
 import pytest
 
-from floatframe import CoordinateCoupler
-from floatframe.integrators import CLASSES
+from floatframe.integrators.registry import CLASSES
+from floatframe.joints import CoordinateCoupler
 from floatframe.model.elements.element import Element
 from floatframe.model.forces import FORCES
 from floatframe.model.joints import JOINTS

@@ -15,7 +15,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import floatframe as ff
-from floatframe.integrators import CLASSES
+from floatframe.integrators.registry import CLASSES
 from floatframe.model.functions.time_functions import harmonic
 from tests.floatframe.engine.tree.mechanisms import beam
 from tests.root import ROOT
@@ -59,7 +59,7 @@ def slot(on_rod, *, is_own, motions):
     if is_own:
         return KINDS.joint("pin", *ends, motions=motions)
     names = {"distance": "second", "angle": "angle"}
-    return ff.PlanarJoint("pin", *ends, motions={"first": 0.0} | {names[name]: x for name, x in motions.items()})
+    return ff.joints.PlanarJoint("pin", *ends, motions={"first": 0.0} | {names[name]: x for name, x in motions.items()})
 
 
 def cord(*, is_own):
@@ -84,7 +84,7 @@ def machine(*, is_own, has_force=True, is_flexible=False, motions=None):
     spring = ff.SpringDamper("spring", ff.Marker(ff.GROUND), ends[0], stiffness=300.0, damping=2.0)
     both = cord(is_own=is_own) if has_force else {}
     forces = [GRAVITY, spring, *both.pop("forces", [])] if has_force else [GRAVITY]
-    sensors = [ff.CoordinateSensor("angle", "pin", "angle"), ff.PlaceSensor("tip", TIP)]
+    sensors = [ff.sensors.CoordinateSensor("angle", "pin", "angle"), ff.sensors.PlaceSensor("tip", TIP)]
     return ff.System([rod, arm], joints, forces, sensors=sensors, **both)
 
 
@@ -92,12 +92,12 @@ def machine(*, is_own, has_force=True, is_flexible=False, motions=None):
 
 SCHEMES = {
     "GeneralizedAlpha": ff.GeneralizedAlpha(0.9, 1e-12),
-    "RelativeGeneralizedAlpha": ff.RelativeGeneralizedAlpha(0.9, 1e-12),
-    "RelativeOde": ff.RelativeOde("BDF", 1e-9, 1e-11),
-    "EnergyMomentum": ff.EnergyMomentum(),
-    "EnergyDecaying": ff.EnergyDecaying(0.5),
-    "Variational": ff.Variational(),
-    "Ida": ff.Ida(1e-6, 1e-8),
+    "RelativeGeneralizedAlpha": ff.integrators.RelativeGeneralizedAlpha(0.9, 1e-12),
+    "RelativeOde": ff.integrators.RelativeOde("BDF", 1e-9, 1e-11),
+    "EnergyMomentum": ff.integrators.EnergyMomentum(),
+    "EnergyDecaying": ff.integrators.EnergyDecaying(0.5),
+    "Variational": ff.integrators.Variational(),
+    "Ida": ff.integrators.Ida(1e-6, 1e-8),
 }
 EXACT = 1e-8  #: of lengths of 1
 CLOSE = {"RelativeOde": 1e-6, "Ida": 1e-6}  #: schemes that control their error take other steps
@@ -139,8 +139,8 @@ def run(system, formulation="absolute", **options):
 def small(system, formulation="absolute"):
     """Return the equilibrium, and the system linearised about it: a torque along the pin goes in, the tip comes out."""
     about = ff.static_equilibrium(system, formulation=formulation)
-    inputs = [ff.CoordinateChannel("torque", "pin", "angle")]
-    outputs = [ff.Channel("tip", TIP, (0, 1, 0)), ff.CoordinateChannel("rate", "pin", "angle", rate=1)]
+    inputs = [ff.sensors.CoordinateChannel("torque", "pin", "angle")]
+    outputs = [ff.sensors.Channel("tip", TIP, (0, 1, 0)), ff.sensors.CoordinateChannel("rate", "pin", "angle", rate=1)]
     return about, ff.linearize(system, about, inputs=inputs, outputs=outputs, formulation=formulation)
 
 
@@ -157,33 +157,33 @@ def modes(system, folder, formulation):
 def response(system, folder, formulation):
     """Return the responses of tip and rate to the torque."""
     linear = small(system, formulation)[1]
-    frequencies = ff.resolved_frequencies(linear, 0.5, 3.0)[:3]
+    frequencies = ff.analyses.resolved_frequencies(linear, 0.5, 3.0)[:3]
     return np.abs(ff.frequency_response(linear, frequencies).values)
 
 
 def state_space(system, folder):
     """Return the gain at rest of the written state space."""
     linear = small(system)[1]
-    ff.write_state_space(linear, folder / "linear.npz")
-    space = ff.named_state_space(linear)
+    ff.analyses.write_state_space(linear, folder / "linear.npz")
+    space = ff.analyses.named_state_space(linear)
     return (space.C @ np.linalg.solve(1j * np.eye(len(space.A)) - space.A, space.B)).view(float)
 
 
 def steady_motion(system, folder):
     """Return where the machine rests, as a steady motion at the speed zero from its equilibrium on."""
     at_rest = ff.static_equilibrium(system).state
-    return ff.steady_motion(system, "arm", 0.0, state=at_rest).equilibrium.state.r
+    return ff.analyses.steady_motion(system, "arm", 0.0, state=at_rest).equilibrium.state.r
 
 
 def locus(system, folder):
     """Return eigenvalues over a parameter that changes nothing."""
-    return magnitudes(ff.root_locus(lambda _: small(system)[1], [0.0, 1.0]).eigenvalues)
+    return magnitudes(ff.analyses.root_locus(lambda _: small(system)[1], [0.0, 1.0]).eigenvalues)
 
 
 def sensitivities(system, folder):
     """Return the derivatives of the tip by a mass and a stiffness."""
     parameters = ["bodies.rod.mass", "forces.spring.stiffness"]
-    return ff.sensitivities(system, ["tip y"], parameters, t_end=T_END, h=H).gradient
+    return ff.design.sensitivities(system, ["tip y"], parameters, t_end=T_END, h=H).gradient
 
 
 def results(system, folder, formulation):
@@ -191,11 +191,11 @@ def results(system, folder, formulation):
     path = folder / f"{formulation}.h5"
     motion = run(system, formulation, output=path)
     assert_allclose(ff.read_results(path).body("arm").r, motion.body("arm").r, rtol=0, atol=0)
-    angle = ff.joint_coordinate(system, motion, "pin", "angle")
-    assert_allclose(ff.joint_coordinates(system, motion)["pin.angle"].value, angle.value, rtol=0, atol=0)
+    angle = ff.results.joint_coordinate(system, motion, "pin", "angle")
+    assert_allclose(ff.results.joint_coordinates(system, motion)["pin.angle"].value, angle.value, rtol=0, atol=0)
     assert_allclose(motion.sensor("angle")["value"], angle.value, rtol=0, atol=0)
-    ff.motion_table(motion, system=system).write(folder / "motion.csv")
-    tip = ff.measured(system, motion)["tip"]
+    ff.results.motion_table(motion, system=system).write(folder / "motion.csv")
+    tip = ff.sensors.measured(system, motion)["tip"]
     return np.column_stack([angle.value, angle.rate, tip["y"], motion.energies.total])
 
 
@@ -207,23 +207,23 @@ def resumed(system, folder):
 
     with pytest.raises(KeyboardInterrupt):
         run(system, output=folder / "run.h5", progress=interrupted, batch_steps=20)
-    return ff.resume(system, folder / "run.h5").body("arm").r
+    return ff.simulation.resume(system, folder / "run.h5").body("arm").r
 
 
 def outputs(system, folder):
     """Return what sensors would measure in an identification."""
-    found = ff.computed_outputs(system, np.linspace(0.0, T_END, 11), ["tip y", "pin.angle value"])
+    found = ff.design.identification.computed_outputs(system, np.linspace(0.0, T_END, 11), ["tip y", "pin.angle value"])
     return np.array(list(found.values.values()))
 
 
 def inverse_kinematics(system, folder):
     """Return the place of the arm at which the tip is where it should be."""
-    return ff.inverse_kinematics(system, ff.Target(TIP, position=(1.6, 0.3, 0.0))).state.r[1]
+    return ff.analyses.inverse_kinematics(system, ff.analyses.Target(TIP, position=(1.6, 0.3, 0.0))).state.r[1]
 
 
 def open_equations(system, folder):
     """Return accelerations and energy of the open equations in a motion."""
-    equations = ff.open_equations(system)
+    equations = ff.analyses.open_equations(system)
     x, v = equations.vectors(run(system).state(-1))
     return np.append(equations.accelerations(T_END, x, v)[0], equations.energy(x, v))
 
@@ -233,9 +233,9 @@ def pictures(system, folder):
     about, linear = small(system)
     found = ff.system_modes(linear)
     ff.view(run(system), folder / "motion.html", system=system)
-    ff.view_modes(system, about, found, folder / "modes.html")
-    ff.draw_mode(system, about, found, 1, folder / "mode.png")
-    ff.snapshot(system, about)
+    ff.pictures.view_modes(system, about, found, folder / "modes.html")
+    ff.pictures.draw_mode(system, about, found, 1, folder / "mode.png")
+    ff.analyses.snapshot(system, about)
     return len(list(folder.iterdir()))
 
 
@@ -251,12 +251,12 @@ BOTH = {
     "frequency_response in joint coordinates": lambda system, folder: response(system, folder, "relative"),
     "named_state_space write_state_space": state_space,
     "root_locus": locus,
-    "campbell": lambda system, _: magnitudes(ff.campbell(system, [0.0]).eigenvalues),
+    "campbell": lambda system, _: magnitudes(ff.analyses.campbell(system, [0.0]).eigenvalues),
     "steady_motion": steady_motion,
-    "steady_rotation": lambda system, _: ff.steady_rotation(system, (0.0, 0.0, 0.0)).state.r,
+    "steady_rotation": lambda system, _: ff.analyses.steady_rotation(system, (0.0, 0.0, 0.0)).state.r,
     "sensitivities": sensitivities,
-    "mobility": lambda system, _: ff.mobility(system).n_freedoms,
-    "consistent_state": lambda system, _: ff.consistent_state(system).state.u,
+    "mobility": lambda system, _: ff.analyses.mobility(system).n_freedoms,
+    "consistent_state": lambda system, _: ff.analyses.consistent_state(system).state.u,
     "integrate read_results joint_coordinate joint_coordinates": lambda *given: results(*given, "absolute"),
     "integrate in joint coordinates": lambda *given: results(*given, "relative"),
     "resume": resumed,
@@ -293,10 +293,10 @@ def driven(system, folder):
     moved = ff.kinematics(system, times)
     inverse = ff.inverse_dynamics(system, times)
     motion = run(system)
-    drives = ff.drive_forces(system, motion)
+    drives = ff.analyses.drive_forces(system, motion)
     force = inverse.drives["pin.angle"].force
     assert_allclose(drives["pin.angle"].force[::5], force, rtol=0, atol=1e-2 * np.abs(force).max())
-    freed = run(ff.with_motors(system, {"pin.angle": drives["pin.angle"]}))
+    freed = run(ff.analyses.with_motors(system, {"pin.angle": drives["pin.angle"]}))
     return np.concatenate([moved.body("arm").r.ravel(), force, freed.body("arm").r.ravel()])
 
 
@@ -311,9 +311,9 @@ def test_the_law_of_the_cord_is_found_good_and_its_energy_is_that_of_its_force()
     system = machine(is_own=True)
     force = replace(system.elements[0], stiffening=300.0)
     system = replace(system, elements=[force], forces=[GRAVITY])
-    assert ff.check_element(system, "cord").findings == ()
-    motion = ff.integrate(system, ff.EnergyMomentum(), T_END, H, watch="off")
-    seen = ff.element_motion(system, motion, "cord")
+    assert ff.analyses.check_element(system, "cord").findings == ()
+    motion = ff.integrate(system, ff.integrators.EnergyMomentum(), T_END, H, watch="off")
+    seen = ff.results.element_motion(system, motion, "cord")
     e = seen.outputs["elongation"]
     assert_allclose(seen.wrench[:, 1, :3], -seen.wrench[:, 0, :3], rtol=0, atol=1e-12)
     assert_allclose(np.linalg.norm(seen.wrench[:, 0, :3], axis=1), STIFFNESS * e + 300.0 * e**3, rtol=1e-12)
@@ -330,7 +330,7 @@ def compared(columns):
 
 
 def test_recursions_of_the_joint_are_those_of_floatframe():
-    own, planar = (ff.relative_model(machine(is_own=is_own, has_force=False)) for is_own in (True, False))
+    own, planar = (ff.analyses.relative_model(machine(is_own=is_own, has_force=False)) for is_own in (True, False))
     z, z_dot, z_ddot = np.random.default_rng(1).normal(size=(3, 3))
     motion = [np.array([0.0, -x[0], x[1], x[2]]) for x in (z, z_dot, z_ddot)]
     force = own.inverse_dynamics(z, z_dot, z_ddot)
@@ -344,15 +344,15 @@ def test_recursions_of_the_joint_are_those_of_floatframe():
 def test_generated_code_and_linear_forms_of_the_joint_are_its_recursions(tmp_path):
     system = machine(is_own=True, has_force=False)
     motion = np.random.default_rng(2).normal(size=(3, 3))
-    force = ff.relative_model(system).inverse_dynamics(*motion)
-    code = ff.generate(system, language="python", name="generated").files["generated.py"]
+    force = ff.analyses.relative_model(system).inverse_dynamics(*motion)
+    code = ff.design.generate(system, language="python", name="generated").files["generated.py"]
     space = {}
     exec(code, space)
     assert_allclose(space["generated"](*motion), force, rtol=0, atol=1e-12 * np.abs(force).max())
-    form = ff.linear_form(system)
-    samples = ff.tree_samples(system, *motion[:, None])
+    form = ff.design.identification.linear_form(system)
+    samples = ff.design.identification.tree_samples(system, *motion[:, None])
     assert_allclose(form.torques(samples)[0] @ form.values, force, rtol=0, atol=1e-12 * np.abs(force).max())
-    unit = ff.generate_fmu(system, tmp_path / "pin.fmu")
+    unit = ff.design.generate_fmu(system, tmp_path / "pin.fmu")
     assert "pin.distance.value" in {each.name for each in unit.variables}
 
 
@@ -370,10 +370,10 @@ class NoRows(ff.model.joints.Joint):
 
 
 REFUSALS = {
-    "relative_model": (lambda _: ff.relative_model(cord_alone()), "element 'cord'"),
-    "generate": (lambda _: ff.generate(cord_alone()), "element 'cord'"),
-    "generate_fmu": (lambda folder: ff.generate_fmu(cord_alone(), folder / "cord.fmu"), "element 'cord'"),
-    "robot_of_system": (lambda _: ff.robot_of_system(machine(is_own=True, has_force=False)), "joint 'pin'"),
+    "relative_model": (lambda _: ff.analyses.relative_model(cord_alone()), "element 'cord'"),
+    "generate": (lambda _: ff.design.generate(cord_alone()), "element 'cord'"),
+    "generate_fmu": (lambda folder: ff.design.generate_fmu(cord_alone(), folder / "cord.fmu"), "element 'cord'"),
+    "robot_of_system": (lambda _: ff.files.robot_of_system(machine(is_own=True, has_force=False)), "joint 'pin'"),
     "no joint": (lambda _: ff.System([ff.RigidBody("b", 1.0, np.eye(3))], [object()]), "expected .* a Joint"),
     "no rows": (lambda _: NoRows().rows(None, None, None), "NoRows: expected a method rows"),
 }
@@ -382,7 +382,7 @@ REFUSALS = {
 @pytest.mark.parametrize("what", REFUSALS)
 def test_what_does_not_take_them_says_so_by_name(what, tmp_path):
     refused, words = REFUSALS[what]
-    with pytest.raises(ff.FloatframeError, match=words):
+    with pytest.raises(ff.errors.FloatframeError, match=words):
         refused(tmp_path)
 
 

@@ -13,7 +13,6 @@ from floatframe import (
     FlexibleBody,
     Gravity,
     Marker,
-    ModelError,
     PointForce,
     RevoluteJoint,
     RigidBody,
@@ -22,6 +21,7 @@ from floatframe import (
     System,
 )
 from floatframe.engine.compiling.system import compiled_system
+from floatframe.errors import ModelError
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 
 REDUCED = reduced_body(random_point_masses(2, 3), stiffness(2))

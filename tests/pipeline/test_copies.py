@@ -15,8 +15,9 @@ import fe_models
 import floatframe
 from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.records import FrozenMapping
-from floatframe import GROUND, ConvergenceError, FlexibleBody, GeneralizedAlpha, RevoluteJoint, System, integrate
+from floatframe import GROUND, FlexibleBody, GeneralizedAlpha, RevoluteJoint, System, integrate
 from floatframe.components.mechanisms import slider_crank
+from floatframe.errors import ConvergenceError
 from tests.bodies import box_mesh
 from tests.floatframe.results.examples import SYSTEM
 from tests.synthetic import synthetic_reduced_body

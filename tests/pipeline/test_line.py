@@ -25,7 +25,9 @@ GRAVITY = 9810.0
 def body():
     mesh = fe_models.read_mesh(shipped_mesh("connecting_rod"))
     steel = fe_models.Material("steel", E=210e3, nu=0.3, rho=7.85e-9)
-    ends = [fe_models.rigid_interface(mesh, name, fe_models.FaceGroup(name)) for name in ("big_end", "small_end")]
+    ends = [
+        fe_models.rigid_interface(mesh, name, fe_models.selections.FaceGroup(name)) for name in ("big_end", "small_end")
+    ]
     units = cms.unit_system("mm-t-s")
     return cms.couple(fe_models.solid_body(mesh, steel, name="rod", units=units, interfaces=ends))
 

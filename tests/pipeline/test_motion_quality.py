@@ -53,4 +53,4 @@ def test_motions_of_another_body_are_refused(body, rich):
         recovered_displacements(rich, np.zeros((3, rich.n_q + 1)), rich)
     larger = cms.couple(bar(nx=9, kind="hexahedron"))
     with pytest.raises(QualityError, match=r"lacks .* nodes of"):
-        recovered_displacements(rich, np.zeros((3, rich.n_q)), cms.reduce(larger, cms.guyan(larger)))
+        recovered_displacements(rich, np.zeros((3, rich.n_q)), cms.reduce(larger, cms.modes.guyan(larger)))

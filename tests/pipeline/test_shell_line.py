@@ -14,10 +14,10 @@ L, B, T = 1.0, 0.2, 0.004
 
 @pytest.fixture(scope="module")
 def reduced(tmp_path_factory):
-    mesh = fm.flat_plate(L, B, 20, 4)
-    root = fm.shell_interface(mesh, "root", fm.NodeSet("u0"), reference=(0.0, B / 2, 0.0))
+    mesh = fm.shells.flat_plate(L, B, 20, 4)
+    root = fm.shells.shell_interface(mesh, "root", fm.selections.NodeSet("u0"), reference=(0.0, B / 2, 0.0))
     flap = fm.shell_body(
-        mesh, fm.ShellProperty(T, STEEL), name="flap", units=cms.unit_system("m-kg-s"), interfaces=[root]
+        mesh, fm.shells.ShellProperty(T, STEEL), name="flap", units=cms.unit_system("m-kg-s"), interfaces=[root]
     )
     body = cms.couple(flap)
     made = cms.reduce(body, cms.craig_bampton(body, n_modes=4), frame=cms.NodalFrame("root"))

@@ -5,8 +5,8 @@ import re
 import numpy as np
 from numpy.testing import assert_allclose
 
-from floatframe import measured
 from floatframe.model.functions.time_functions import cycloidal_spin_up
+from floatframe.sensors import measured
 from tests.root import ROOT
 
 GUIDE = ROOT / "docs" / "user_guide.md"

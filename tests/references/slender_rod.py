@@ -12,7 +12,8 @@ import scipy.sparse as sp
 
 import cms
 import fe_models as fm
-from floatframe import GeneralizedAlpha, corotational, finite_segments, integrate
+from floatframe import GeneralizedAlpha, integrate
+from floatframe.components import corotational, finite_segments
 from floatframe.components.flexible_parts import FlexiblePart
 from floatframe.components.mechanisms import slider_crank
 from floatframe.model.functions.time_functions import TimeFunction, cycloidal_spin_up, polynomial_of_time
@@ -25,7 +26,7 @@ from tests.references.planar_dynamics import integrate as integrate_exact
 CRANK, ROD, DIAMETER, SPEED = 0.15, 0.3, 0.006, 150.0
 TURN = 2 * np.pi / SPEED
 STEEL = fm.Material("steel", E=2.0e11, nu=0.3, rho=7870.0)
-SECTION = fm.Circle(DIAMETER / 2)
+SECTION = fm.beams.Circle(DIAMETER / 2)
 AREA, INERTIA = np.pi * DIAMETER**2 / 4, np.pi * DIAMETER**4 / 64
 MASS = STEEL.rho * AREA * ROD
 UNITS = cms.unit_system("m-kg-s")
@@ -89,9 +90,14 @@ def exact(drive: TimeFunction, t_end: float, n_steps: int, *, n: int = 4, every:
 def beam_rod(frame: str = "tisserand", *, geometric: bool = True):
     """Beam elements, Craig-Bampton with six modes."""
     n = 16
-    mesh = fm.straight_line((0, 0, 0), (ROD, 0, 0), n)
-    kept = [fm.line_interface(mesh, p, fm.NodeIndices((k,))) for p, k in zip(STATIONS, (0, n // 2, n), strict=True)]
-    body = cms.couple(fm.beam_body(mesh, fm.BeamProperty(SECTION, STEEL), name="rod", units=UNITS, interfaces=kept))
+    mesh = fm.beams.straight_line((0, 0, 0), (ROD, 0, 0), n)
+    kept = [
+        fm.beams.line_interface(mesh, p, fm.beams.NodeIndices((k,)))
+        for p, k in zip(STATIONS, (0, n // 2, n), strict=True)
+    ]
+    body = cms.couple(
+        fm.beam_body(mesh, fm.beams.BeamProperty(SECTION, STEEL), name="rod", units=UNITS, interfaces=kept)
+    )
     chord = cms.NodalFrame(dofs=((0, 0), (0, 1), (0, 2), (0, 3), (n, 1), (n, 2)))
     frames = {"tisserand": cms.TisserandFrame(), "secant": chord, "tangent": cms.NodalFrame("start")}
     return cms.reduce(body, cms.craig_bampton(body, n_modes=6), frame=frames[frame], geometric=geometric)
@@ -99,8 +105,8 @@ def beam_rod(frame: str = "tisserand", *, geometric: bool = True):
 
 def assumed_rod(*, geometric: bool = True):
     """Legendre polynomials: three of tension, six of bending along each axis."""
-    line = fm.beam_line(ROD, fm.BeamProperty(SECTION, STEEL, shear=False))
-    return cms.beam_from_assumed_modes(
+    line = fm.beams.beam_line(ROD, fm.beams.BeamProperty(SECTION, STEEL, shear=False))
+    return cms.reduction.beam_from_assumed_modes(
         line, name="rod", units=UNITS, n_axial=3, n_bending=6, n_torsion=1, stations=STATIONS, geometric=geometric
     )
 
@@ -114,7 +120,7 @@ def solid_rod(*, geometric: bool = True):
     )
     material = fm.Material("steel", E=STEEL.E, nu=STEEL.nu, rho=STEEL.rho * AREA / side**2)
     ends = {place: STATIONS[place] for place in ("start", "end")}
-    kept = [fm.rigid_interface(mesh, place, fm.Plane((x, 0, 0), (1, 0, 0))) for place, x in ends.items()]
+    kept = [fm.rigid_interface(mesh, place, fm.selections.Plane((x, 0, 0), (1, 0, 0))) for place, x in ends.items()]
     body = cms.couple(fm.solid_body(mesh, material, name="rod", units=UNITS, interfaces=kept))
     return with_middle(cms.reduce(body, cms.craig_bampton(body, n_modes=6), geometric=geometric))
 
@@ -123,7 +129,7 @@ def with_middle(body: cms.ReducedBody) -> cms.ReducedBody:
     """Add the mean of the surface nodes in the middle as a place to look at; a rigid section there would stiffen."""
     members = np.flatnonzero(np.abs(body.nodes[:, 0]) < 1e-9)
     Psi = np.vstack([body.Phi[members].mean(axis=0), np.zeros((3, body.n_q))])
-    middle = cms.ReducedInterface("middle", "nodes", np.zeros(3), np.eye(3), Psi, members, has_rotation=False)
+    middle = cms.body.ReducedInterface("middle", "nodes", np.zeros(3), np.eye(3), Psi, members, has_rotation=False)
     geometric = body.geometric
     if geometric is not None:
         geometric = replace(geometric, is_loaded=(*geometric.is_loaded, False))
@@ -132,14 +138,16 @@ def with_middle(body: cms.ReducedBody) -> cms.ReducedBody:
 
 def rod_of_segments(n: int):
     """Finite segments; n odd, so that one lies in the middle."""
-    line = fm.beam_line(ROD, fm.BeamProperty(SECTION, STEEL))
+    line = fm.beams.beam_line(ROD, fm.beams.BeamProperty(SECTION, STEEL))
     return partial(finite_segments, line=line, n=n, stations=STATIONS)
 
 
 def corotational_rod(n: int):
     """Superelements in a row, each of Legendre polynomials; n even, so that a node lies in the middle."""
-    line = fm.beam_line(ROD / n, fm.BeamProperty(SECTION, STEEL))
-    element = cms.beam_from_assumed_modes(line, name="element", units=UNITS, n_axial=1, n_bending=2, n_torsion=1)
+    line = fm.beams.beam_line(ROD / n, fm.beams.BeamProperty(SECTION, STEEL))
+    element = cms.reduction.beam_from_assumed_modes(
+        line, name="element", units=UNITS, n_axial=1, n_bending=2, n_torsion=1
+    )
 
     def make(name, *, position, orientation):
         part = corotational(name, [element] * n, position=position, orientation=orientation)

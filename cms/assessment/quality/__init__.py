@@ -3,6 +3,6 @@
 `check_body` reads a modal file alone, `check_reduction` compares it with the full model.
 """
 
-import lazy_loader
+from fe_models.door import open_door
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+open_door(__name__)

@@ -1,4 +1,3 @@
-from .body_check import check_body as check_body
 from .errors import QualityError as QualityError
 from .limits import LIMITS as LIMITS
 from .limits import Limit as Limit
@@ -29,7 +28,6 @@ from .plots import plot_frf as plot_frf
 from .record import QualityRecord as QualityRecord
 from .record import has_failed as has_failed
 from .record import worst as worst
-from .reduction_check import check_reduction as check_reduction
 from .reference.free_basis import FreeBasis as FreeBasis
 from .reference.free_basis import free_basis as free_basis
 from .reference.full_reference import FullReference as FullReference

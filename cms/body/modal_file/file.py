@@ -59,7 +59,7 @@ def write(reduced: ReducedBody, path: str | os.PathLike[str]) -> None:
     if (suffix := Path(path).suffix.lower()) and suffix not in SUFFIXES and not is_stream(Path(path)):
         raise ModalFileError(
             f"{path}: a modal file ends in {' or '.join(SUFFIXES)}, got {suffix}; other formats are written by "
-            "cms.export_body (cms export --to)"
+            "cms.exchange.export_body (cms export --to)"
         )
     write_sealed(content_of(reduced, version_of(reduced)), path)
 

@@ -133,7 +133,7 @@ def parse_sets(text: str) -> tuple[str, ...]:
 
 
 def parse_load(text: str) -> Any:
-    """Return the load "INTERFACE:mass=1.2,stiffness=1e4" as made by `cms.point_load`.
+    """Return the load "INTERFACE:mass=1.2,stiffness=1e4" as made by `cms.modes.point_load`.
 
     Raises
     ------

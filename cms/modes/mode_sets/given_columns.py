@@ -170,9 +170,9 @@ def user_basis(
         A coupled body, or its `Families`, which several sets can share.
     columns
         Displacement columns over the dofs of the coupled body, (n_dof, k), or of its mesh, (n_mesh_dof, k). Columns
-        over the mesh are converted by `cms.coupled_field`: rigid interfaces take the best-fitting rigid motion, and the
-        options of the set give the remainder. Alternatively a file: .npy with the array, or .npz with `columns` and
-        optionally `labels` and `frequencies`.
+        over the mesh are converted by `cms.modes.coupled_field`: rigid interfaces take the best-fitting rigid motion,
+        and the options of the set give the remainder. Alternatively a file: .npy with the array, or .npz with `columns`
+        and optionally `labels` and `frequencies`.
     columns_over
         "coupled" or "mesh": the dofs of the rows. Needed if both have the same number, because their order differs;
         otherwise the number of rows decides.

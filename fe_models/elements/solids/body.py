@@ -228,7 +228,7 @@ def solid_body(
     ----------
     mesh
         Tetrahedra, hexahedra, wedges and pyramids, also mixed; faces and lines are ignored. A `fe_models.Mesh`, or a
-        mesh of meshio, pyvista or scikit-fem (`fe_models.as_mesh`).
+        mesh of meshio, pyvista or scikit-fem (`fe_models.meshes.as_mesh`).
     materials
         One material for all cells, or one for each group name (`assign_materials`), in the units of the mesh. Materials
         may be anisotropic.

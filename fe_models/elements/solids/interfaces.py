@@ -33,7 +33,7 @@ def rigid_interface(
     Parameters
     ----------
     mesh
-        Mesh of the body, from this package or another library, or a basis of scikit-fem (`fe_models.as_mesh`).
+        Mesh of the body, from this package or another library, or a basis of scikit-fem (`fe_models.meshes.as_mesh`).
     name
         Name of the interface.
     selection

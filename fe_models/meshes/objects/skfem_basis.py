@@ -108,7 +108,7 @@ def raw_from_basis(basis: Any) -> RawMesh:
     if element not in SOLID_KINDS:
         raise MeshError(
             f"scikit-fem basis of {element}: no cell type here has its nodes (known: {', '.join(SOLID_KINDS)}); "
-            "select interfaces on fe_models.NodeCloud(nodes)"
+            "select interfaces on fe_models.meshes.NodeCloud(nodes)"
         )
     positions = np.asarray(basis.mesh.doflocs, dtype=float).T
     vertices = np.unique(basis.mesh.t)

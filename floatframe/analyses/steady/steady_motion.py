@@ -10,6 +10,7 @@ import numpy as np
 import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.records import checked_fields
 from floatframe.analyses.equilibrium import (
     CLOSED,
     LARGEST_TURN,
@@ -401,15 +402,32 @@ SHORTEST = 1e-4  #: smallest damping factor of a Newton step
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ModelError)
 class SteadyMotion:
-    """A system in steady running."""
+    """A system in steady running.
 
-    system: System  #: system with the values found for its open parameters
-    equilibrium: Equilibrium  #: steady state; `linearize(system, equilibrium)` gives small motions about it
-    speed: float  #: speed of the reference body [m/s]
-    curvature: float  #: curvature of the path, positive about the axis [1/m]
-    found: Mapping[str, float]  #: values found for the open parameters, by name
-    spins: Mapping[str, float]  #: speeds of spinning bodies about their axes, relative to the moving frame [rad/s]
+    Parameters
+    ----------
+    system
+        The system with the values found for its open parameters.
+    equilibrium
+        The steady state; `linearize(system, equilibrium)` gives small motions about it.
+    speed
+        Speed of the reference body [m/s].
+    curvature
+        Curvature of the path, positive about the axis [1/m].
+    found
+        Values found for the open parameters, by name.
+    spins
+        Speeds of spinning bodies about their axes, relative to the moving frame, by name [rad/s].
+    """
+
+    system: System
+    equilibrium: Equilibrium
+    speed: float
+    curvature: float
+    found: Mapping[str, float]
+    spins: Mapping[str, float]
 
 
 def steady_motion(

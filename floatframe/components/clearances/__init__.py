@@ -9,4 +9,4 @@ ELEMENTS = {
     "hinge": "floatframe.components.clearances.hinge:HingeWithPlay",
 }
 
-__all__ = ["ELEMENTS", "Backlash", "BallWithPlay", "HingeWithPlay"]
+__all__ = ["Backlash", "BallWithPlay", "HingeWithPlay"]

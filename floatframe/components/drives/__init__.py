@@ -21,4 +21,4 @@ ELEMENTS = {
     "torque-map": "floatframe.components.drives.torque_map:TorqueMap",
 }
 
-__all__ = ["ELEMENTS", "AntiSkidBrake", "DcMotor", "InductionMotor", "Pid", "PidDrive", "SpeedControl", "TorqueMap"]
+__all__ = ["AntiSkidBrake", "DcMotor", "InductionMotor", "Pid", "PidDrive", "SpeedControl", "TorqueMap"]

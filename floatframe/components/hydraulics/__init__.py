@@ -30,7 +30,6 @@ ELEMENTS = {
 }
 
 __all__ = [
-    "ELEMENTS",
     "Accumulator",
     "CheckValve",
     "Circuit",

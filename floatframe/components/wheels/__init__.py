@@ -1,9 +1,8 @@
 """Wheels on roads: tyres (linear, brush, Magic Formula), tyre property files, flat, measured and random roads."""
 
-import lazy_loader
+from fe_models.door import open_door
 
-# the public names are listed in __init__.pyi; each module is imported when its name is first used
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+open_door(__name__)
 
 #: module and class of each element, by its type in a system file without "wheels."
 ELEMENTS = {

@@ -286,7 +286,8 @@ def stress_rows(body: FEBody) -> sp.csr_array:
     Parameters
     ----------
     body
-        Coupled body with points of `fe_models.shell_points`: only a few, because each of their dofs is evaluated.
+        Coupled body with points of `fe_models.shells.shell_points`: only a few, because each of their dofs is
+        evaluated.
 
     Raises
     ------
@@ -295,7 +296,7 @@ def stress_rows(body: FEBody) -> sp.csr_array:
     """
     points = body.stress_points
     if not isinstance(points, ShellPoints) or body.recovery is None:
-        raise ModelError(f"stress rows: body {body.name!r}: expected stress points of fe_models.shell_points")
+        raise ModelError(f"stress rows: body {body.name!r}: expected stress points of fe_models.shells.shell_points")
     on_mesh = np.unique(np.concatenate([group.dofs[rows].ravel() for group, rows in points.parts]))
     dofs = np.unique(sp.csr_array(body.recovery.matrix)[on_mesh].indices)
     pick = sp.csr_array((np.ones(len(dofs)), (np.arange(len(dofs)), dofs)), shape=(len(dofs), body.n_dof))

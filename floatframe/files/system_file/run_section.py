@@ -17,9 +17,9 @@ from floatframe.engine.compiling.file_frames import state_of_file
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.tree.formulation import FORMULATIONS
 from floatframe.errors import SystemFileError
-from floatframe.integrators import INTEGRATORS
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha, hht, newmark, trapezoidal
 from floatframe.integrators.integrator import Integrator
+from floatframe.integrators.registry import INTEGRATORS
 from floatframe.integrators.relative import RelativeGeneralizedAlpha, in_formulation
 from floatframe.model.state import State
 from floatframe.model.system import System

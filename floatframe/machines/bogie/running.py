@@ -11,7 +11,7 @@ from floatframe.analyses.linear.linearization import LinearSystem, linearize
 from floatframe.analyses.linear.system_modes import SystemModes, system_modes
 from floatframe.analyses.steady.steady_motion import SteadyMotion, steady_motion
 from floatframe.errors import ModelError
-from floatframe.integrators import GeneralizedAlpha
+from floatframe.integrators.generalized_alpha import GeneralizedAlpha
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.bodies.rigid_body import RigidBody
 from floatframe.model.forces import PointForce

@@ -14,7 +14,7 @@ from fe_models.foundation.arrays import Array
 from floatframe.analyses.linear.linearization import linearize
 from floatframe.analyses.steady.steady_motion import SteadyMotion
 from floatframe.errors import ConvergenceError, ModelError
-from floatframe.integrators import GeneralizedAlpha
+from floatframe.integrators.generalized_alpha import GeneralizedAlpha
 from floatframe.machines.bogie.running import lateral_modes, steady_motion_of
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.rotations import euler_parameter_product, euler_parameters_of_rotation_vector, rotation_matrix

@@ -41,31 +41,31 @@ PLACES = {
 #: name -> function that makes the mode set with n vibration modes
 SETS: dict[str, Callable[[Families, int], ModeSet]] = {
     "craig-bampton": lambda families, n: cms.craig_bampton(families, n_modes=n),
-    "craig-bampton-ir": lambda families, n: cms.craig_bampton_ir(families, n_modes=n),
+    "craig-bampton-ir": lambda families, n: cms.modes.craig_bampton_ir(families, n_modes=n),
     "rubin": lambda families, n: cms.rubin(families, n_modes=n),
-    "attachment": lambda families, n: cms.attachment(families, n_modes=n),
-    "krylov": lambda families, n: cms.krylov(families, n_modes=n),
-    "balanced-truncation": lambda families, n: cms.balanced_truncation(families, n_modes=n),
-    "normal": lambda families, n: cms.normal_modes(families, n_modes=n),
+    "attachment": lambda families, n: cms.modes.attachment(families, n_modes=n),
+    "krylov": lambda families, n: cms.modes.krylov(families, n_modes=n),
+    "balanced-truncation": lambda families, n: cms.modes.balanced_truncation(families, n_modes=n),
+    "normal": lambda families, n: cms.modes.normal_modes(families, n_modes=n),
 }
 
 #: mode sets that span the same space as `rubin` with as many modes
 MORE_SETS: dict[str, Callable[[Families, int], ModeSet]] = {
-    "herting": lambda families, n: cms.herting(families, n_modes=n),
-    "macneal": lambda families, n: cms.macneal(families, n_modes=n),
-    "craig-chang": lambda families, n: cms.craig_chang(families, n_modes=n),
-    "dual-craig-bampton": lambda families, n: cms.dual_craig_bampton(families, n_modes=n),
-    "unrestrained-attachment": lambda families, n: cms.unrestrained_attachment(families, n_modes=n),
+    "herting": lambda families, n: cms.modes.herting(families, n_modes=n),
+    "macneal": lambda families, n: cms.modes.macneal(families, n_modes=n),
+    "craig-chang": lambda families, n: cms.modes.craig_chang(families, n_modes=n),
+    "dual-craig-bampton": lambda families, n: cms.modes.dual_craig_bampton(families, n_modes=n),
+    "unrestrained-attachment": lambda families, n: cms.modes.unrestrained_attachment(families, n_modes=n),
 }
 
 
-def engine_loads(system: System) -> list[cms.InterfaceLoad]:
-    """Return the loads of the body's bushings on its interfaces for `cms.benfield_hruda`, as springs to the ground."""
+def engine_loads(system: System) -> list[cms.modes.InterfaceLoad]:
+    """Return the bushing loads on the body's interfaces for `cms.modes.benfield_hruda`, as springs to the ground."""
     loads = []
     for force in system.forces:
         if isinstance(force, Bushing) and isinstance(force.marker_b, Marker) and force.marker_b.interface is not None:
             K = np.diag(force.stiffness).tolist()
-            loads.append(cms.point_load(force.marker_b.interface, stiffness=K[:3], rotational_stiffness=K[3:]))
+            loads.append(cms.modes.point_load(force.marker_b.interface, stiffness=K[:3], rotational_stiffness=K[3:]))
     return loads
 
 
@@ -119,7 +119,9 @@ def engine_study(
         plain = replace(run.integrator, stabilized=False)
         loadings[Path(path).stem] = Loading(replace(system, sensors=()), plain, run.t_end, run.h, every)
     loads = engine_loads(next(iter(loadings.values())).system)
-    makers = SETS | MORE_SETS | {"benfield-hruda": lambda families, n: cms.benfield_hruda(families, n, loads=loads)}
+    makers = (
+        SETS | MORE_SETS | {"benfield-hruda": lambda families, n: cms.modes.benfield_hruda(families, n, loads=loads)}
+    )
     wanted = [*((name, n) for name in sets for n in n_modes), *also]
     unknown = [name for name, _ in wanted if name not in makers]
     if unknown:

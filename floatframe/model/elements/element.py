@@ -269,7 +269,7 @@ class Element:
         raise ModelError(f"{type(self).__name__}: expected a method law(placed) that returns an ElementLaw")
 
     def events(self) -> Sequence[Any]:
-        """Return events of the element, as `floatframe.Event` on "NAME.OUTPUT"; by default none.
+        """Return events of the element, as `floatframe.simulation.Event` on "NAME.OUTPUT"; by default none.
 
         Events are evaluated after blocks of steps, in Python; `ElementLaw.stops` has no such cost.
         """

@@ -7,8 +7,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import cms
-from cms import Address, BuckensFrame, NodalFrame, craig_bampton, reduce
+from cms import NodalFrame, craig_bampton, reduce
+from cms.body import Address
 from cms.errors import BodyError
+from cms.reduction import BuckensFrame
 from cms.reduction.basis.node_motion import kept_points
 from cms.reduction.frame_conversion import convert_frame, six_motions
 from fe_models.body.couplings.couplings import couple
@@ -117,7 +119,7 @@ def test_numbers_sets_and_points_come_back_from_a_file_of_version_5(tmp_path):
     assert [(s.name, s.kind, s.size) for s in again.numbering.sets] == [
         (s.name, s.kind, s.size) for s in reduced.numbering.sets
     ]
-    in_mm = cms.convert_units(again, "mm-t-s")  # q in t^(1/2) mm: the same rotation of 1 kg^(1/2) m
+    in_mm = cms.body.convert_units(again, "mm-t-s")  # q in t^(1/2) mm: the same rotation of 1 kg^(1/2) m
     assert_allclose(in_mm.kept.rotation * (1e-3**0.5 * 1e3), reduced.kept.rotation, rtol=1e-12)
 
 

@@ -84,9 +84,9 @@ def test_a_file_keeps_what_is_known_and_has_no_dataset_of_what_is_not(body, tmp_
         assert [f"C{t[0]}" in file["invariants"] for t in INERTIA_TERMS] == [
             t not in part.moments.missing for t in INERTIA_TERMS
         ]
-    in_mm = cms.convert_units(part, "mm-t-s")
+    in_mm = cms.body.convert_units(part, "mm-t-s")
     assert in_mm.moments.missing == part.moments.missing
-    expected = cms.convert_units(lacking(body, ()), "mm-t-s").moments.C2
+    expected = cms.body.convert_units(lacking(body, ()), "mm-t-s").moments.C2
     assert_allclose(in_mm.moments.C2, expected, rtol=0, atol=1e-14 * np.abs(expected).max())
 
 
@@ -113,8 +113,8 @@ def test_a_false_word_about_what_is_missing_is_refused(body, tmp_path):
 
 @pytest.mark.parametrize("missing", [("3C",), ("5C",), ("3C", "4C", "5C")])
 def test_another_frame_needs_nothing_that_is_missing(real, missing):
-    whole = cms.convert_frame(real, cms.TisserandFrame())
-    part = cms.convert_frame(lacking(real, missing), cms.TisserandFrame())
+    whole = cms.reduction.convert_frame(real, cms.TisserandFrame())
+    part = cms.reduction.convert_frame(lacking(real, missing), cms.TisserandFrame())
     assert part.moments.missing == (("3C", "4C", "5C") if "3C" in missing else missing)
     assert_allclose(part.free_frequencies, whole.free_frequencies, rtol=1e-12)
     for name in ("m", "S", "R", "C1", "C2", "M"):

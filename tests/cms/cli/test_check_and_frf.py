@@ -15,7 +15,7 @@ from cms.cli.app import app
 from cms.cli.frf import parse_band, parse_component
 from cms.jobs.job import read_job
 from cms.pipeline import reduce_job
-from fe_models import read_table
+from fe_models.files import read_table
 from tests.bodies import box_mesh
 from tests.decks import JOB, write_deck
 

@@ -61,8 +61,8 @@ def test_a_job_of_matrices_reduces_as_that_of_the_mesh(folder):
     reduced = cms.reduce_job(job_in(folder))
     mesh = fe_models.read_mesh(folder / "blockC3D10.inp")
     steel = fe_models.Material("steel", E=2e11, nu=0.3, rho=2900.0)
-    left = fe_models.rigid_interface(mesh, "left", fe_models.Plane((0, 0, 0), (1, 0, 0)))
-    corners = fe_models.nodes_interface(mesh, "corners", fe_models.NodeNumbers((1, 2, 3, 4)))
+    left = fe_models.rigid_interface(mesh, "left", fe_models.selections.Plane((0, 0, 0), (1, 0, 0)))
+    corners = fe_models.body.nodes_interface(mesh, "corners", fe_models.selections.NodeNumbers((1, 2, 3, 4)))
     body = fe_models.solid_body(
         mesh, steel, name="block", units=fe_models.unit_system("m-kg-s"), interfaces=[left, corners]
     )
@@ -122,7 +122,7 @@ def test_keys_of_matrices_belong_to_matrices(tmp_path, folder):
     with pytest.raises(JobError, match="remove_supports: belongs to matrices"):
         cms.jobs.job.read_job(path)
     with pytest.raises(FeModelsError, match="node numbers 900: 1 of 2 are not in the mesh"):
-        fe_models.NodeNumbers((1, 900)).members(fe_models.read_geometry(folder / "blockC3D10.inp"))
+        fe_models.selections.NodeNumbers((1, 900)).members(fe_models.files.read_geometry(folder / "blockC3D10.inp"))
 
 
 FRAME = """
@@ -146,11 +146,11 @@ n_modes = 4
 def test_matrices_that_bring_their_nodes_need_no_geometry(tmp_path):
     """A bent frame of our beams, its nodes renumbered: elements with rotations, interfaces by number and by box."""
     points = np.array([[0, 0, 0], [0, 0, 0.7], [0, 0, 1.3], [0, 0, 2], [0.5, 0, 2], [1, 0, 2]], dtype=float)
-    lines = fe_models.LineMesh(points, np.array([[k, k + 1] for k in range(5)]))
+    lines = fe_models.beams.LineMesh(points, np.array([[k, k + 1] for k in range(5)]))
     steel = fe_models.Material("steel", E=2.1e11, nu=0.3, rho=7850.0)
     frame = fe_models.beam_body(
         lines,
-        fe_models.BeamProperty(fe_models.Circle(0.02), steel),
+        fe_models.beams.BeamProperty(fe_models.beams.Circle(0.02), steel),
         name="frame",
         units=fe_models.unit_system("m-kg-s"),
     )
@@ -161,8 +161,8 @@ def test_matrices_that_bring_their_nodes_need_no_geometry(tmp_path):
     job = tmp_path / "frame.toml"
     job.write_text(FRAME)
     reduced = cms.reduce_job(job)
-    foot = fe_models.line_interface(lines, "foot", fe_models.NodeIndices((0,)))
-    tip = fe_models.line_interface(lines, "tip", fe_models.NodeIndices((5,)), kind="nodes")
+    foot = fe_models.beams.line_interface(lines, "foot", fe_models.beams.NodeIndices((0,)))
+    tip = fe_models.beams.line_interface(lines, "tip", fe_models.beams.NodeIndices((5,)), kind="nodes")
     coupled = fe_models.couple(frame.with_interfaces(foot, tip))
     ours = cms.reduce(coupled, cms.craig_bampton(coupled, n_modes=4), geometric=False)
     assert_allclose(np.diag(reduced.K), np.diag(ours.K), rtol=1e-9, atol=0)
@@ -172,7 +172,7 @@ def test_matrices_that_bring_their_nodes_need_no_geometry(tmp_path):
 
 def test_distributing_interfaces_and_faces_on_a_geometry_of_shells(tmp_path, folder):
     """A deck of shells is a cloud of nodes with face groups: their area weighs a distributing interface."""
-    geometry = fe_models.NodeCloud(
+    geometry = fe_models.meshes.NodeCloud(
         np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0], [4, 0, 0], [4, 1, 0]], dtype=float),
         face_sets={"web": {"quad": np.array([[0, 1, 2, 3], [1, 4, 5, 2]])}, "left": {"quad": np.array([[0, 1, 2, 3]])}},
         node_numbers=np.arange(1, 7),
@@ -182,9 +182,9 @@ def test_distributing_interfaces_and_faces_on_a_geometry_of_shells(tmp_path, fol
     interfaces = {"web": cms.jobs.job.InterfaceSection.model_validate(table)}
     (web,) = interfaces_on(job.model_copy(update={"interfaces": interfaces}), geometry)
     assert_allclose(web.weights, np.array([1, 2, 2, 1, 1, 1]) / 8, rtol=1e-12, atol=0)
-    assert fe_models.FaceGroup("left").members(geometry).tolist() == [0, 1, 2, 3]
+    assert fe_models.selections.FaceGroup("left").members(geometry).tolist() == [0, 1, 2, 3]
     with pytest.raises(FeModelsError, match="no face group 'right'"):
-        fe_models.FaceGroup("right").members(geometry)
+        fe_models.selections.FaceGroup("right").members(geometry)
 
 
 def test_a_full_file_of_ansys_with_its_deck_has_the_printed_frequency(tmp_path):

@@ -9,9 +9,9 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fe_models import read_matrices
 from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.errors import MatrixError
+from fe_models.files import read_matrices
 from fe_models.files.ansys_matrices.full import read_full
 from fe_models.files.ansys_matrices.sub import SCALAR, read_sub
 

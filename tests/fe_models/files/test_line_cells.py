@@ -74,7 +74,7 @@ def written(tmp_path, **files):
 
 
 def test_physical_curves_of_gmsh_become_groups_of_lines(tmp_path):
-    mesh = fm.read_line_mesh(written(tmp_path, frame_msh=MSH) / "frame.msh")
+    mesh = fm.beams.read_line_mesh(written(tmp_path, frame_msh=MSH) / "frame.msh")
     assert_allclose(mesh.nodes, [(0, 0, 0), (0, 0, 2), (0, 0, 1), (1, 0, 2)])
     # the curve with a middle node is two lines; the line listed for two groups is there once, in both
     assert {tuple(sorted(line)) for line in mesh.lines.tolist()} == {(0, 2), (1, 2), (1, 3)}
@@ -89,7 +89,7 @@ def test_physical_curves_of_gmsh_become_groups_of_lines(tmp_path):
 
 
 def test_only_the_lines_of_the_named_groups_are_taken(tmp_path):
-    mesh = fm.read_line_mesh(written(tmp_path, frame_msh=MSH) / "frame.msh", groups=["beam"])
+    mesh = fm.beams.read_line_mesh(written(tmp_path, frame_msh=MSH) / "frame.msh", groups=["beam"])
     assert len(mesh.lines) == 1
     assert_allclose(np.sort(mesh.nodes[:, 0]), [0, 1])
     assert_array_equal(mesh.line_sets["leg"], [0])
@@ -97,7 +97,7 @@ def test_only_the_lines_of_the_named_groups_are_taken(tmp_path):
 
 def test_beams_of_abaqus_and_nastran_are_lines_with_their_groups(tmp_path):
     folder = written(tmp_path, shaft_inp=INP, frame_bdf=BDF)
-    shaft, frame = fm.read_line_mesh(folder / "shaft.inp"), fm.read_line_mesh(folder / "frame.bdf")
+    shaft, frame = fm.beams.read_line_mesh(folder / "shaft.inp"), fm.beams.read_line_mesh(folder / "frame.bdf")
     assert_array_equal(shaft.lines, [(0, 1), (1, 2)])
     assert_array_equal(shaft.line_sets["shaft"], [0, 1])
     assert_array_equal(shaft.node_sets["tip"], [2])
@@ -107,7 +107,7 @@ def test_beams_of_abaqus_and_nastran_are_lines_with_their_groups(tmp_path):
 
 def test_tables_give_nodes_lines_groups_and_axes(tmp_path):
     folder = written(tmp_path, nodes_csv=NODES, lines_csv=LINES)
-    mesh = fm.read_tables(folder / "nodes.csv", folder / "lines.csv")
+    mesh = fm.files.read_tables(folder / "nodes.csv", folder / "lines.csv")
     assert_allclose(mesh.nodes, [(0, 0, 0), (0, 0, 3), (4, 0, 3)])  # node 99 only orients
     assert_array_equal(mesh.lines, [(0, 1), (1, 2)])
     assert_allclose(mesh.orientations, [(0, 5, 0), (0, 1, 0)])
@@ -119,7 +119,7 @@ def test_tables_give_nodes_lines_groups_and_axes(tmp_path):
 
 def test_tables_may_be_separated_by_semicolons(tmp_path):
     folder = written(tmp_path, a_csv="node;x;y\n1;0;0\n2;1.5;0\n", b_csv="node1;node2\n1;2\n")
-    assert_allclose(fm.read_tables(folder / "a.csv", folder / "b.csv").nodes, [(0, 0, 0), (1.5, 0, 0)])
+    assert_allclose(fm.files.read_tables(folder / "a.csv", folder / "b.csv").nodes, [(0, 0, 0), (1.5, 0, 0)])
 
 
 @pytest.mark.parametrize(
@@ -141,18 +141,18 @@ def test_tables_may_be_separated_by_semicolons(tmp_path):
 def test_bad_tables_are_refused_with_file_and_line(tmp_path, nodes, lines, words):
     folder = written(tmp_path, nodes_csv=nodes, lines_csv=lines)
     with pytest.raises(MeshError, match=words):
-        fm.read_tables(folder / "nodes.csv", folder / "lines.csv")
+        fm.files.read_tables(folder / "nodes.csv", folder / "lines.csv")
 
 
 def test_a_missing_table_is_named(tmp_path):
     with pytest.raises(MeshError, match=r"nodes\.csv: cannot be read: No such file"):
-        fm.read_tables(tmp_path / "nodes.csv", tmp_path / "lines.csv")
+        fm.files.read_tables(tmp_path / "nodes.csv", tmp_path / "lines.csv")
 
 
 def test_a_mesh_without_lines_is_no_frame(tmp_path):
     text = MSH.replace("5\n1 15", "2\n1 15").replace("2 8 2 1 1 1 2 7\n3 1 2 2 2 2 3\n4 1 2 1 2 2 3\n", "")
     folder = written(tmp_path, frame_msh=text)
     with pytest.raises(MeshError, match="expected lines"):
-        fm.read_line_mesh(folder / "frame.msh")
+        fm.beams.read_line_mesh(folder / "frame.msh")
     with pytest.raises(MeshError, match=r"no group of lines 'led'.*did you mean 'leg'"):
-        fm.read_line_mesh(written(tmp_path, frame_msh=MSH) / "frame.msh", groups=["led"])
+        fm.beams.read_line_mesh(written(tmp_path, frame_msh=MSH) / "frame.msh", groups=["led"])

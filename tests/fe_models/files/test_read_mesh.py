@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from fe_models import read_mesh
 from fe_models.checks.mesh_report import report_mesh
 from fe_models.errors import MeshError
-from fe_models.files import read_mesh
 from fe_models.meshes.cells.raw_mesh import mirrored_order
 from tests.fe_models.small_meshes import SOLID_TYPES, cell_mesh, faced_box, nastran_deck
 

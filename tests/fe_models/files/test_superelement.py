@@ -8,7 +8,8 @@ import pytest
 import scipy.linalg as la
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fe_models import UNIT_SYSTEMS, BeamProperty, GeneralSection, beam_body
+from fe_models import UNIT_SYSTEMS, beam_body
+from fe_models.beams import BeamProperty, GeneralSection
 from fe_models.body.material import Material
 from fe_models.errors import MatrixError, MeshError
 from fe_models.files.bulk_data.cards import read_cards

@@ -8,7 +8,8 @@ from cms.errors import JobError
 from cms.jobs.job import read_job
 from fe_models.foundation.toml_file import read_toml
 from fe_models.foundation.words import nearest, quoted
-from floatframe import SystemFileError, integrate
+from floatframe import integrate
+from floatframe.errors import SystemFileError
 from floatframe.files.system_file.read_system import read_system
 
 RIGID = """

@@ -11,7 +11,7 @@ from tests.fe_models.small_shells import SI, STEEL
 
 def frame():
     """A post and a beam on it, with offsets, an orientation and numbers of nodes."""
-    return fm.LineMesh(
+    return fm.beams.LineMesh(
         np.array([(0.0, 0, 0), (0, 0, 3), (4, 0, 3)]),
         np.array([(0, 1), (1, 2)]),
         line_sets={"post": [0], "beam": [1]},
@@ -23,7 +23,7 @@ def frame():
 
 
 def test_pieces_are_equal_and_keep_groups_orientations_and_offsets():
-    mesh = fm.divide_lines(frame(), [1, 4])
+    mesh = fm.beams.divide_lines(frame(), [1, 4])
     assert_array_equal(mesh.lines, [(0, 1), (1, 3), (3, 4), (4, 5), (5, 2)])
     assert_allclose(mesh.nodes[3:], [(1, 0, 3), (2, 0, 3), (3, 0, 3)], rtol=0, atol=1e-15)
     assert_array_equal(mesh.node_numbers, [1, 7, 3, -1, -1, -1])
@@ -35,15 +35,15 @@ def test_pieces_are_equal_and_keep_groups_orientations_and_offsets():
     assert np.isnan(mesh.orientations[1:]).all()
     assert_allclose(mesh.offsets[1:, 0, 2], [0.1, 0.2, 0.3, 0.4], rtol=1e-15)
     assert_allclose(mesh.offsets[1:, 1, 2], [0.2, 0.3, 0.4, 0.5], rtol=1e-15)
-    whole = fm.divide_lines(frame(), 1)
+    whole = fm.beams.divide_lines(frame(), 1)
     assert_array_equal(whole.lines, frame().lines)
     assert_array_equal(whole.nodes, frame().nodes)
 
 
 def test_a_divided_line_is_the_line_of_so_many_elements():
-    one = fm.divide_lines(fm.straight_line((0, 0, 0), (1, 2, 0.5), 1), 5)
-    five = fm.straight_line((0, 0, 0), (1, 2, 0.5), 5)
-    bar = fm.BeamProperty(fm.Circle(0.02), STEEL)
+    one = fm.beams.divide_lines(fm.beams.straight_line((0, 0, 0), (1, 2, 0.5), 1), 5)
+    five = fm.beams.straight_line((0, 0, 0), (1, 2, 0.5), 5)
+    bar = fm.beams.BeamProperty(fm.beams.Circle(0.02), STEEL)
     found, expected = (fm.beam_body(mesh, bar, name="b", units=SI) for mesh in (one, five))
     order = [0, 2, 3, 4, 5, 1]
     assert_allclose(one.nodes[order], five.nodes, rtol=0, atol=1e-15)
@@ -55,14 +55,14 @@ def test_a_divided_line_is_the_line_of_so_many_elements():
 @pytest.mark.parametrize("n", [0, -1, 1.5, True, [1, 2, 3], [[1, 2]]])
 def test_impossible_numbers_are_refused(n):
     with pytest.raises(BeamError, match="divide_lines: expected"):
-        fm.divide_lines(frame(), n)
+        fm.beams.divide_lines(frame(), n)
 
 
 def test_a_table_of_lines_says_how_many_elements_each_has(tmp_path):
     nodes, lines = tmp_path / "nodes.csv", tmp_path / "lines.csv"
     nodes.write_text("node,x,y,z,sets\n1,0,0,0,foot\n2,0,0,3,\n3,4,0,3,tip\n99,0,5,0,\n")
     lines.write_text("node1,node2,group,third,elements\n1,2,post,99,3\n2,3,beam,,\n")
-    mesh = fm.read_tables(nodes, lines)
+    mesh = fm.files.read_tables(nodes, lines)
     assert len(mesh.lines) == 4
     assert_allclose(mesh.nodes[3:], [(0, 0, 1), (0, 0, 2)], rtol=0, atol=1e-15)
     assert_array_equal(mesh.line_sets["post"], [0, 1, 2])
@@ -70,4 +70,4 @@ def test_a_table_of_lines_says_how_many_elements_each_has(tmp_path):
     assert_array_equal(mesh.node_sets["tip"], [2])
     lines.write_text("node1,node2,elements\n1,2,0\n2,3,\n99,1,\n")
     with pytest.raises(MeshError, match=r"line 2: column elements: expected a whole number from 1 on, got '0'"):
-        fm.read_tables(nodes, lines)
+        fm.files.read_tables(nodes, lines)

@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fe_models import LineMesh, MeshError, flat_plate, split_mesh, straight_line
+from fe_models.beams import LineMesh, straight_line
+from fe_models.errors import MeshError
+from fe_models.meshes import split_mesh
 from fe_models.meshes.mesh import Mesh
+from fe_models.shells import flat_plate
 from tests.bodies import box_mesh
 
 

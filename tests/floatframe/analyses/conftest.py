@@ -10,6 +10,10 @@ from tests.cms.reduction.geometric_stiffness.examples import bar_of_beams
 def bar():
     coupled = cms.couple(bar_of_beams(6))
     end = coupled.interfaces[1].name
-    rows = (cms.Rows("acceleration", at=(end,)), cms.Rows("interface force"), cms.Rows("net force", about=(0, 0, 0)))
-    asked = [cms.RecoveryRequest("instruments", rows=rows)]
+    rows = (
+        cms.reduction.Rows("acceleration", at=(end,)),
+        cms.reduction.Rows("interface force"),
+        cms.reduction.Rows("net force", about=(0, 0, 0)),
+    )
+    asked = [cms.reduction.RecoveryRequest("instruments", rows=rows)]
     return cms.reduce(coupled, cms.craig_bampton(coupled, n_modes=3), recovery=asked)

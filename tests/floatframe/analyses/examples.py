@@ -6,45 +6,44 @@ import numpy as np
 
 from floatframe import (
     GROUND,
+    FlexibleBody,
+    Gravity,
+    JointForce,
+    Marker,
+    RevoluteJoint,
+    RigidBody,
+    SpringDamper,
+    State,
+    System,
+    UserForce,
+)
+from floatframe.analyses import consistent_state, snapshot
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.initial_conditions.newton_equations import displaced, in_ground_axes
+from floatframe.forces import Bushing
+from floatframe.joints import AxialDistance, CoordinateCoupler, JointCoordinate
+from floatframe.model.rotations import rotation_matrix
+from floatframe.results.sensors.places import PLACE_QUANTITIES, TURNING
+from floatframe.sensors import (
     AngleSensor,
-    AxialDistance,
-    Bushing,
     Channel,
     ControlSensor,
     CoordinateChannel,
-    CoordinateCoupler,
     CoordinateSensor,
     CouplerSensor,
     DisplacementSensor,
     ElongationSensor,
-    FlexibleBody,
-    Gravity,
     InterfaceForceSensor,
-    JointCoordinate,
-    JointForce,
-    Marker,
     ModeSensor,
     MomentumSensor,
     PlaceSensor,
     ReactionSensor,
-    RevoluteJoint,
-    RigidBody,
-    SpringDamper,
     SpringSensor,
-    State,
     StrainGauge,
     StressSensor,
-    System,
-    UserForce,
     VonMisesSensor,
-    consistent_state,
     measured,
-    snapshot,
 )
-from floatframe.engine.compiling.system import compiled_system
-from floatframe.engine.initial_conditions.newton_equations import displaced, in_ground_axes
-from floatframe.model.rotations import rotation_matrix
-from floatframe.results.sensors.places import PLACE_QUANTITIES, TURNING
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 
 LOADED = ("root", "axle", "stay", "mount")

@@ -15,19 +15,18 @@ from floatframe import (
     Marker,
     PointForce,
     System,
-    corotational,
-    finite_segments,
     linearize,
     static_equilibrium,
     system_modes,
 )
+from floatframe.components import corotational, finite_segments
 from floatframe.model.rotations import euler_parameters_of_rotation_vector
 from tests.references.exact_beam import ExactBeam
 from tests.references.planar_dynamics import Problem, equilibrium
 
 UNITS = cms.unit_system("m-kg-s")
 STEEL = fm.Material("steel", E=2.0e11, nu=0.3, rho=7870.0)
-LEG, SECTION = 0.5, fm.Rectangle(0.02, 0.03)
+LEG, SECTION = 0.5, fm.beams.Rectangle(0.02, 0.03)
 UPWARD = euler_parameters_of_rotation_vector(np.array([0, 0, np.pi / 2]))  # the second leg along y
 
 
@@ -40,22 +39,22 @@ def frame_of_elements():
     nodes = np.column_stack([x, y, np.zeros_like(x)])
     lines = np.column_stack([np.arange(2 * n), np.arange(1, 2 * n + 1)])
     first = np.arange(2 * n) < n
-    mesh = fm.LineMesh(nodes, lines, line_sets={"first": np.flatnonzero(first), "second": np.flatnonzero(~first)})
+    mesh = fm.beams.LineMesh(nodes, lines, line_sets={"first": np.flatnonzero(first), "second": np.flatnonzero(~first)})
     sections = {
-        "first": fm.BeamProperty(SECTION, STEEL, orientation=(0, 1, 0)),
-        "second": fm.BeamProperty(SECTION, STEEL, orientation=(-1, 0, 0)),
+        "first": fm.beams.BeamProperty(SECTION, STEEL, orientation=(0, 1, 0)),
+        "second": fm.beams.BeamProperty(SECTION, STEEL, orientation=(-1, 0, 0)),
     }
-    root = fm.line_interface(mesh, "root", fm.NodeIndices((0,)))
+    root = fm.beams.line_interface(mesh, "root", fm.beams.NodeIndices((0,)))
     body = cms.couple(fm.beam_body(mesh, sections, name="frame", units=UNITS, interfaces=[root]))
     return cms.reduce(body, cms.craig_bampton(body, n_modes=10), frame=cms.NodalFrame("root")).frequencies[:6]
 
 
 def law(length=LEG):
-    return fm.beam_line(length, fm.BeamProperty(SECTION, STEEL))
+    return fm.beams.beam_line(length, fm.beams.BeamProperty(SECTION, STEEL))
 
 
 def leg_of_modes():
-    return cms.beam_from_assumed_modes(law(), name="leg", units=UNITS, n_axial=3, n_bending=6, n_torsion=3)
+    return cms.reduction.beam_from_assumed_modes(law(), name="leg", units=UNITS, n_axial=3, n_bending=6, n_torsion=3)
 
 
 def l_frame(kind):
@@ -68,7 +67,7 @@ def l_frame(kind):
         if kind == "finite segments":
             parts = [finite_segments(name, law(), 17, position=p, orientation=o) for name, p, o in PLACES]
         else:
-            element = cms.beam_from_assumed_modes(
+            element = cms.reduction.beam_from_assumed_modes(
                 law(LEG / 16), name="element", units=UNITS, n_axial=1, n_bending=2, n_torsion=1
             )
             parts = [corotational(name, [element] * 16, position=p, orientation=o) for name, p, o in PLACES]
@@ -96,7 +95,7 @@ ALUMINIUM = fm.Material("aluminium", E=71.7e9, nu=0.31, rho=2700.0)
 
 
 def strip():
-    return fm.beam_line(LENGTH, fm.BeamProperty(fm.Rectangle(THIN, WIDE), ALUMINIUM))
+    return fm.beams.beam_line(LENGTH, fm.beams.BeamProperty(fm.beams.Rectangle(THIN, WIDE), ALUMINIUM))
 
 
 def exact_tip(load):
@@ -114,11 +113,13 @@ def strip_of(kind, force):
     if kind == "segments":
         part = finite_segments("strip", strip(), 17)
     elif kind == "corotational":
-        line = fm.beam_line(LENGTH / 16, fm.BeamProperty(fm.Rectangle(THIN, WIDE), ALUMINIUM))
-        element = cms.beam_from_assumed_modes(line, name="element", units=UNITS, n_axial=1, n_bending=2, n_torsion=1)
+        line = fm.beams.beam_line(LENGTH / 16, fm.beams.BeamProperty(fm.beams.Rectangle(THIN, WIDE), ALUMINIUM))
+        element = cms.reduction.beam_from_assumed_modes(
+            line, name="element", units=UNITS, n_axial=1, n_bending=2, n_torsion=1
+        )
         part = corotational("strip", [element] * 16)
     else:
-        body = cms.beam_from_assumed_modes(
+        body = cms.reduction.beam_from_assumed_modes(
             strip(), name="strip", units=UNITS, n_axial=3, n_bending=6, n_torsion=3, frame=cms.NodalFrame("start")
         )
         system = System(

@@ -12,41 +12,33 @@ import cms
 from fe_models.body.beam_line import BeamLine
 from floatframe import (
     GROUND,
-    Bushing,
-    ConvergenceError,
     FixedJoint,
     FlexibleBody,
     GeneralizedAlpha,
     Gravity,
     JointForce,
     Marker,
-    ModelError,
     PointForce,
     RevoluteJoint,
     RigidBody,
     SphericalJoint,
     SpringDamper,
     System,
-    finite_segments,
     integrate,
-)
-from floatframe.analyses import (
-    campbell,
-    equilibrium,
     linearize,
-    root_locus,
-    snapshot,
     static_equilibrium,
-    steady_rotation,
-    sweep,
     system_modes,
 )
+from floatframe.analyses import campbell, equilibrium, root_locus, snapshot, steady_rotation, sweep
 from floatframe.analyses.system_check import system_vibrations, tangents_at
+from floatframe.components import finite_segments
 from floatframe.components.mechanisms import slider_crank
 from floatframe.components.mechanisms.rods import slender_inertia
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.initial import consistent_motion
 from floatframe.engine.initial_conditions.newton_equations import displaced
+from floatframe.errors import ConvergenceError, ModelError
+from floatframe.forces import Bushing
 from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_exp, rotation_log, rotation_matrix
 from floatframe.model.state import State
 from floatframe.results.place_motion import interface_motion

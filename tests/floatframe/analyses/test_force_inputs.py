@@ -9,19 +9,12 @@ from numpy.testing import assert_allclose
 import cms
 from fe_models.body.load_cases import ReducedLoadCase
 from fe_models.body.loads import gravity_load
-from floatframe import (
-    BodyLoad,
-    ForceInput,
-    JointForce,
-    Marker,
-    ModelError,
-    PointForce,
-    RecoverySensor,
-    consistent_state,
-    linearize,
-    static_equilibrium,
-)
+from floatframe import JointForce, Marker, PointForce, linearize, static_equilibrium
+from floatframe.analyses import ForceInput, consistent_state
+from floatframe.errors import ModelError
+from floatframe.forces import BodyLoad
 from floatframe.model.functions.time_functions import constant, harmonic
+from floatframe.sensors import RecoverySensor
 from tests.cms.reduction.geometric_stiffness.examples import bar_of_beams
 from tests.floatframe.analyses.examples import TURN, held, machine, sensors, values_of
 
@@ -82,7 +75,11 @@ def test_the_static_part_of_a_load_case_is_fed_through():
     body = bar_of_beams(6)
     body = body.with_load_cases(gravity_load(body, "side", (0.0, 3.0, 1.0)))
     coupled = cms.couple(body)
-    asked = [cms.RecoveryRequest("table", rows=(cms.Rows("interface force"), cms.Rows("beam force")))]
+    asked = [
+        cms.reduction.RecoveryRequest(
+            "table", rows=(cms.reduction.Rows("interface force"), cms.reduction.Rows("beam force"))
+        )
+    ]
     bar = cms.reduce(coupled, cms.craig_bampton(coupled, n_modes=1), recovery=asked)
 
     def system(a):

@@ -14,26 +14,24 @@ from typer.testing import CliRunner
 
 from floatframe import (
     GROUND,
-    Channel,
-    CoordinateChannel,
     FlexibleBody,
     Gravity,
     Marker,
-    ModelError,
     PointForce,
     RevoluteJoint,
     RigidBody,
     SpringDamper,
-    StressChannel,
     System,
     frequency_response,
     linearize,
-    resolved_frequencies,
     static_equilibrium,
 )
+from floatframe.analyses import resolved_frequencies
 from floatframe.analyses.snapshot import snapshot
 from floatframe.cli.app import app
+from floatframe.errors import ModelError
 from floatframe.results.sensors import StressSensor
+from floatframe.sensors import Channel, CoordinateChannel, StressChannel
 from tests.floatframe.cli.examples import PENDULUM
 from tests.floatframe.point_masses import PointMasses, random_point_masses, reduced_body, stiffness
 

@@ -13,18 +13,17 @@ from floatframe import (
     GeneralizedAlpha,
     Gravity,
     Marker,
-    ModelError,
     RevoluteJoint,
     RigidBody,
     System,
-    drive_forces,
     integrate,
     inverse_dynamics,
-    with_motors,
 )
+from floatframe.analyses import drive_forces, with_motors
 from floatframe.cli.app import app
 from floatframe.components.mechanisms import slider_crank
 from floatframe.components.mechanisms.rods import slender_inertia
+from floatframe.errors import ModelError
 from floatframe.model.functions.time_functions import harmonic
 from tests.floatframe.examples import CRANK, TURN
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness

@@ -5,11 +5,13 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import minimize
 
-from floatframe import GROUND, CoordinateCoupler, Limits, Marker, ModelError, RevoluteJoint, RigidBody, System
+from floatframe import GROUND, Marker, RevoluteJoint, RigidBody, System
 from floatframe.analyses.inverse_kinematics import Target, inverse_kinematics, least_within
 from floatframe.components.mechanisms import slider_crank
+from floatframe.errors import ModelError
 from floatframe.files.importers.read_urdf import read_urdf
 from floatframe.files.importers.robot_system import robot_system
+from floatframe.joints import CoordinateCoupler, Limits
 from floatframe.model.bodies.coordinates import JointCoordinate
 from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_matrix
 from tests.floatframe.files.importers.random_robots import random_robot

@@ -8,40 +8,38 @@ from numpy.testing import assert_allclose
 
 from floatframe import (
     GROUND,
-    ConvergenceError,
-    CoordinateCoupler,
-    CylindricalJoint,
-    DistanceJoint,
     FlexibleBody,
     GeneralizedAlpha,
     Gravity,
-    JointCoordinate,
     Marker,
-    ModelError,
-    PointOnPlane,
     RevoluteJoint,
     RigidBody,
-    RollingDisc,
-    ScrewJoint,
     System,
-    UniversalJoint,
-    consistent_state,
-    frozen_bodies,
     integrate,
-    joint_coordinate,
     kinematics,
-    quasi_static_bodies,
     read_results,
     static_equilibrium,
-    steady_rotation,
 )
+from floatframe.analyses import consistent_state, frozen_bodies, quasi_static_bodies, steady_rotation
 from floatframe.analyses.snapshot import snapshot
 from floatframe.components.mechanisms import double_pendulum, four_bar, slider_crank
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.newton_equations import set_iterate
 from floatframe.engine.kernels.work import new_work
+from floatframe.errors import ConvergenceError, ModelError
+from floatframe.joints import (
+    CoordinateCoupler,
+    CylindricalJoint,
+    DistanceJoint,
+    JointCoordinate,
+    PointOnPlane,
+    RollingDisc,
+    ScrewJoint,
+    UniversalJoint,
+)
 from floatframe.model.functions.time_functions import constant, harmonic, polynomial_of_time
 from floatframe.model.rotations import rotation_matrix
+from floatframe.results import joint_coordinate
 from floatframe.results.joint_coordinates import joint_coordinates
 from floatframe.results.small_motions.joint_rates import coordinate_rows
 from tests.floatframe.examples import parallelogram

@@ -6,30 +6,22 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import (
+from floatframe import JointForce, Marker, PointForce, UserForce, linearize, static_equilibrium
+from floatframe.analyses import ParameterInput, campbell, consistent_state, steady_rotation
+from floatframe.errors import ModelError
+from floatframe.results.sensors.places import PLACE_QUANTITIES, TURNING
+from floatframe.sensors import (
     AngleSensor,
     Channel,
     CoordinateChannel,
     DisplacementSensor,
     InterfaceForceSensor,
-    JointForce,
-    Marker,
-    ModelError,
-    ParameterInput,
     PlaceSensor,
-    PointForce,
     ReactionSensor,
     SpringSensor,
     StressSensor,
-    UserForce,
     VonMisesSensor,
-    campbell,
-    consistent_state,
-    linearize,
-    static_equilibrium,
-    steady_rotation,
 )
-from floatframe.results.sensors.places import PLACE_QUANTITIES, TURNING
 from tests.floatframe.analyses.examples import compare, flexible, machine, rotor, sensors, values_of
 
 

@@ -8,10 +8,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from floatframe import (
     GROUND,
-    Bushing,
     JointForce,
     Marker,
-    PlanarJoint,
     PointForce,
     PrismaticJoint,
     RevoluteJoint,
@@ -20,9 +18,11 @@ from floatframe import (
     System,
     linearize,
     static_equilibrium,
-    steady_rotation,
     system_modes,
 )
+from floatframe.analyses import steady_rotation
+from floatframe.forces import Bushing
+from floatframe.joints import PlanarJoint
 from floatframe.model.rotations import euler_parameters, rotation_exp
 from tests.floatframe.other_units import SI, in_units
 

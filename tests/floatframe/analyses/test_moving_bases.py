@@ -8,19 +8,10 @@ from numpy.testing import assert_allclose
 
 from floatframe import (
     GROUND,
-    BaseMotion,
-    Channel,
-    Column,
-    CoordinateSensor,
-    DriveMotion,
     GeneralizedAlpha,
     Gravity,
     Marker,
-    ModelError,
-    MomentumSensor,
-    PlaceSensor,
     PrismaticJoint,
-    ReactionSensor,
     RevoluteJoint,
     RigidBody,
     SpringDamper,
@@ -28,14 +19,14 @@ from floatframe import (
     System,
     integrate,
     linearize,
-    measured,
-    named_state_space,
     static_equilibrium,
-    steady_rotation,
 )
+from floatframe.analyses import BaseMotion, Column, DriveMotion, named_state_space, steady_rotation
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.newton_equations import displaced, in_ground_axes
+from floatframe.errors import ModelError
 from floatframe.model.functions.time_functions import constant, harmonic
+from floatframe.sensors import Channel, CoordinateSensor, MomentumSensor, PlaceSensor, ReactionSensor, measured
 from tests.floatframe.analyses.examples import machine, rotor, sensors
 
 F = np.array([0.0, 0.4, 1.3, 9.0, 60.0])  #: Hz, across all modes

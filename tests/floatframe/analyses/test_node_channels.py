@@ -7,10 +7,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 import cms
-from floatframe import GROUND, FixedJoint, FlexibleBody, Gravity, Marker, ModelError, System
+from floatframe import GROUND, FixedJoint, FlexibleBody, Gravity, Marker, System
 from floatframe.analyses.equilibrium import static_equilibrium
 from floatframe.analyses.linear.channels import Channel
 from floatframe.analyses.linear.linearization import linearize
+from floatframe.errors import ModelError
 from tests.cms.reduction.geometric_stiffness.examples import bar_of_beams
 
 

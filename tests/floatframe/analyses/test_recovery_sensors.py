@@ -11,26 +11,20 @@ import cms
 from fe_models.body.loads import nodal_load
 from floatframe import (
     GROUND,
-    BaseMotion,
-    BodyLoad,
-    Bushing,
     FixedJoint,
     FlexibleBody,
     Gravity,
-    InterfaceForceSensor,
     Marker,
-    ModelError,
-    PlaceSensor,
     PointForce,
-    RecoverySensor,
     SphericalJoint,
     System,
-    consistent_state,
     linearize,
-    measured,
-    snapshot,
     static_equilibrium,
 )
+from floatframe.analyses import BaseMotion, consistent_state, snapshot
+from floatframe.errors import ModelError
+from floatframe.forces import BodyLoad, Bushing
+from floatframe.sensors import InterfaceForceSensor, PlaceSensor, RecoverySensor, measured
 from tests.cms.reduction.geometric_stiffness.examples import bar_of_beams
 from tests.floatframe.analyses.examples import compare, held
 
@@ -53,9 +47,9 @@ def placed():
     )
     coupled = cms.couple(part)
     root, tip = (each.name for each in coupled.interfaces)
-    rows = [cms.Rows(quantity, at=(tip,)) for quantity in ("displacement", "velocity", "acceleration")]
-    rows += [cms.Rows("interface force"), cms.Rows("net force", about=(0.1, -0.2, 0.3))]
-    asked = [cms.RecoveryRequest("instruments", rows=rows)]
+    rows = [cms.reduction.Rows(quantity, at=(tip,)) for quantity in ("displacement", "velocity", "acceleration")]
+    rows += [cms.reduction.Rows("interface force"), cms.reduction.Rows("net force", about=(0.1, -0.2, 0.3))]
+    asked = [cms.reduction.RecoveryRequest("instruments", rows=rows)]
     frame = cms.TisserandFrame(axes=Rotation.from_rotvec([0.4, 0.7, -0.5]).as_matrix())
     reduced = cms.reduce(coupled, cms.craig_bampton(coupled, n_modes=3), frame=frame, recovery=asked)
     turn, place = Rotation.from_rotvec([-0.8, 0.5, 1.1]), np.array([0.4, -0.3, 0.2])
@@ -180,7 +174,7 @@ def test_interface_forces_under_moving_bases_are_those_of_the_craig_bampton_matr
     base = BaseMotion("base", direction, quantity, place, joints=(end.name,), rate=0)
     outputs = [InterfaceForceSensor(each.name, "bar", each.name) for each in bar.interfaces]
     linear = linearize(System([FlexibleBody("bar", bar)], joints), inputs=[base], outputs=outputs)
-    matrices, n_b = cms.craig_bampton_matrices(bar), 12
+    matrices, n_b = cms.reduction.craig_bampton_matrices(bar), 12
     for f in (0.0, 30.0, 400.0):
         Z = np.asarray(matrices.K) - (2 * np.pi * f) ** 2 * np.asarray(matrices.M)
         bb, be, ee = Z[:n_b, :n_b], Z[:n_b, n_b:], Z[n_b:, n_b:]

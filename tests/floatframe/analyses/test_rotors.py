@@ -8,24 +8,21 @@ from numpy.testing import assert_allclose
 
 from floatframe import (
     GROUND,
-    Bushing,
-    ConvergenceError,
     Gravity,
     Marker,
-    ModelError,
-    PlanarJoint,
     PrismaticJoint,
     RevoluteJoint,
     RigidBody,
     System,
-    campbell,
     linearize,
-    named_state_space,
     static_equilibrium,
-    steady_rotation,
 )
+from floatframe.analyses import campbell, named_state_space, steady_rotation
 from floatframe.analyses.linear import parameter_study
 from floatframe.design.gradients.parameters import value_at, with_value
+from floatframe.errors import ConvergenceError, ModelError
+from floatframe.forces import Bushing
+from floatframe.joints import PlanarJoint
 from floatframe.model.elements.expressions import ExpressionElement
 from floatframe.model.functions.time_functions import polynomial_of_time
 from floatframe.model.rotations import rotation_exp
@@ -99,7 +96,7 @@ def test_whirls_that_speeds_far_apart_leave_undecided_are_not_joined(monkeypatch
 
 def test_a_mode_that_is_not_met_again_ends_its_line():
     """A mode of one body at one value, of another body at the next: two lines, each with a gap."""
-    from floatframe import root_locus
+    from floatframe.analyses import root_locus
 
     def build(value):
         stiff = np.array([1.0, 0, 0, 0, 0, 0]) * 100.0

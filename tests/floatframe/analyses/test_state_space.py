@@ -14,35 +14,28 @@ import cms
 import fe_models as fm
 from floatframe import (
     GROUND,
-    AxialDistance,
-    Channel,
-    ControlSensor,
-    CoordinateChannel,
     FixedJoint,
     FlexibleBody,
-    JointCoordinate,
     JointForce,
     Marker,
-    ModelError,
     RevoluteJoint,
     RigidBody,
     SphericalJoint,
     State,
     System,
-    UniversalJoint,
     UserForce,
-    consistent_state,
     integrate,
-    joint_coordinate,
     linearize,
-    measured,
-    named_state_space,
-    trapezoidal,
-    write_state_space,
 )
+from floatframe.analyses import consistent_state, named_state_space, write_state_space
 from floatframe.components.mechanisms import double_pendulum, pendulum
+from floatframe.errors import ModelError
+from floatframe.integrators import trapezoidal
+from floatframe.joints import AxialDistance, JointCoordinate, UniversalJoint
 from floatframe.model.bodies.mode_choice import with_modes
 from floatframe.model.rotations import euler_parameters, euler_parameters_of_rotation_vector, rotation_matrix
+from floatframe.results import joint_coordinate
+from floatframe.sensors import Channel, ControlSensor, CoordinateChannel, measured
 
 LENGTH = 1.2
 
@@ -50,9 +43,9 @@ LENGTH = 1.2
 @pytest.fixture(scope="module")
 def rod():
     """A slender beam with its two lowest bending modes in the plane of the mechanism."""
-    line = fm.straight_line((0, 0, 0), (LENGTH, 0, 0), 6)
-    ends = [fm.line_interface(line, end, fm.NodeSet(end)) for end in ("start", "end")]
-    section = fm.BeamProperty(fm.Rectangle(0.006, 0.04), fm.Material("rod", 70e9, 0.3, 2700.0))
+    line = fm.beams.straight_line((0, 0, 0), (LENGTH, 0, 0), 6)
+    ends = [fm.beams.line_interface(line, end, fm.selections.NodeSet(end)) for end in ("start", "end")]
+    section = fm.beams.BeamProperty(fm.beams.Rectangle(0.006, 0.04), fm.Material("rod", 70e9, 0.3, 2700.0))
     body = fm.couple(fm.beam_body(line, section, name="rod", units=fm.unit_system("m-kg-s"), interfaces=ends))
     return with_modes(cms.reduce(body, cms.craig_bampton(body, n_modes=1), frame=cms.TisserandFrame()), [0, 1])
 
@@ -100,8 +93,8 @@ def test_slow_motions_are_right_beside_modes_a_million_times_as_fast(units):
         return value / unit.to_si(length=length, mass=mass, time=time)
 
     EI, J, J_block = of(1e9, 3, 1, -2), of(1e-3, 1, 1), of(np.diag([0.02, 0.03, 0.04]), 2, 1)
-    line = cms.BeamLine(of(1.0, 1), of(1.0, -1, 1), of(1e12, 1, 1, -2), EI, 1.5 * EI, EI, J, J)
-    beam = cms.beam_from_assumed_modes(line, name="beam", units=unit, n_axial=1, n_bending=2, n_torsion=1)
+    line = fm.beams.BeamLine(of(1.0, 1), of(1.0, -1, 1), of(1e12, 1, 1, -2), EI, 1.5 * EI, EI, J, J)
+    beam = cms.reduction.beam_from_assumed_modes(line, name="beam", units=unit, n_axial=1, n_bending=2, n_torsion=1)
     bodies = [FlexibleBody("beam", beam), RigidBody("block", of(2.0, 0, 1), J_block, position=(of(1.0, 1), 0, 0))]
     at_hinge, at_block = Marker(GROUND, position=np.zeros(3)), Marker("block", position=np.zeros(3))
     joints = [RevoluteJoint("hinge", at_hinge, Marker("beam", "start"), axis=e),

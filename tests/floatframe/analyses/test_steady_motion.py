@@ -55,8 +55,8 @@ def bicycle(v):
         ff.RevoluteJoint("rear_axle", at("frame", places["rear"]), ff.Marker("rear"), axis=(0, 1, 0)),
         ff.RevoluteJoint("steer", at("frame", head), at("fork", head), axis=tuple(axis)),
         ff.RevoluteJoint("front_axle", at("fork", places["front"]), ff.Marker("front"), axis=(0, 1, 0)),
-        ff.RollingDisc("rear_rolls", ff.Marker(ff.GROUND), ff.Marker("rear"), radius=0.3),
-        ff.RollingDisc("front_rolls", ff.Marker(ff.GROUND), ff.Marker("front"), radius=0.35),
+        ff.joints.RollingDisc("rear_rolls", ff.Marker(ff.GROUND), ff.Marker("rear"), radius=0.3),
+        ff.joints.RollingDisc("front_rolls", ff.Marker(ff.GROUND), ff.Marker("front"), radius=0.35),
     ]
     return ff.System(bodies, joints, [GRAVITY])
 
@@ -74,13 +74,13 @@ def bicycle_eigenvalues(v):
 @pytest.mark.parametrize("v", [3.0, 5.0, 8.0])
 def test_the_bicycle_weaves_and_capsizes_as_the_benchmark_says(v):
     """Two spinning wheels that roll without slip, ridden straight: unstable weave, stable, unstable capsize."""
-    motion = ff.steady_motion(bicycle(v), "frame")
+    motion = ff.analyses.steady_motion(bicycle(v), "frame")
     linear = ff.linearize(motion.system, motion.equilibrium, inputs=(), outputs=())
     found, expected = ff.system_modes(linear).eigenvalues, bicycle_eigenvalues(v)
     moving = found[np.abs(found) > 1e-3]  # x, y, yaw, and the turns of the wheels cost nothing, nor does the speed
     assert_allclose(upper(moving), upper(expected), rtol=1e-8)
     assert 3 <= len(found) - len(moving) <= 6  # with the speed six zeros; of two rounding may make a pair, told once
-    A = np.linalg.eigvals(ff.named_state_space(linear).A)
+    A = np.linalg.eigvals(ff.analyses.named_state_space(linear).A)
     assert_allclose(upper(A[np.abs(A) > 1e-2]), upper(expected), rtol=1e-6)
 
 
@@ -90,7 +90,7 @@ def disc(V, lean=0.0, m=2.0, r=0.3):
         "disc", m, m * r**2 * np.diag([0.25, 0.5, 0.25]), position=(0, 0, r * np.cos(lean)), velocity=(V, 0, 0),
         orientation=(np.cos(lean / 2), -np.sin(lean / 2), 0, 0), omega_B=(0, V / r, 0),
     )  # fmt: skip
-    rolls = ff.RollingDisc("rolls", ff.Marker(ff.GROUND), ff.Marker("disc"), radius=r)
+    rolls = ff.joints.RollingDisc("rolls", ff.Marker(ff.GROUND), ff.Marker("disc"), radius=r)
     return ff.System([body], [rolls], [GRAVITY])
 
 
@@ -98,14 +98,14 @@ def disc(V, lean=0.0, m=2.0, r=0.3):
 def test_an_upright_disc_falls_below_the_speed_of_theory(V):
     """lambda² = 4 g/(5 r) - 12 V²/(5 r²): stable where V² > g r/3."""
     expected = np.sqrt(0.8 * G / 0.3 - 2.4 * (V / 0.3) ** 2 + 0j)
-    found = eigenvalues(ff.steady_motion(disc(V), "disc"))
+    found = eigenvalues(ff.analyses.steady_motion(disc(V), "disc"))
     assert np.abs(found - expected).min() < 1e-7
 
 
 def test_a_disc_in_a_circle_leans_as_moments_about_its_contact_say():
     """m g r sin a = (m r² + I_3) w Omega cos a + I_1 Omega² sin a cos a, w = V/r its turn about its own axis."""
     V, R, m, r = 2.0, 1.5, 2.0, 0.3
-    motion = ff.steady_motion(disc(V, lean=0.2), "disc", curvature=1 / R, spinning={"disc": (0, 1, 0)})
+    motion = ff.analyses.steady_motion(disc(V, lean=0.2), "disc", curvature=1 / R, spinning={"disc": (0, 1, 0)})
     w, x, y, z = motion.equilibrium.state.p[0]
     lean = np.arcsin(-2 * (y * z + w * x))  # the axle's z
     Omega = V / R
@@ -128,8 +128,8 @@ def test_a_rotor_in_a_housing_on_unlike_springs_whirls_as_its_four_equations_say
         "bearing", ff.Marker("housing", position=(0, 0, arm)), ff.Marker("rotor"), axis=(0, 0, 1)
     )
     stiffness = np.array([*k, 1e6, *turning, 1e3])
-    springs = ff.Bushing("springs", ff.Marker(ff.GROUND), ff.Marker("housing"), stiffness)
-    motion = ff.steady_motion(ff.System([rotor, housing], [bearing], [springs]), "housing", 0.0)
+    springs = ff.forces.Bushing("springs", ff.Marker(ff.GROUND), ff.Marker("housing"), stiffness)
+    motion = ff.analyses.steady_motion(ff.System([rotor, housing], [bearing], [springs]), "housing", 0.0)
     assert motion.spins == {"rotor": spin}
     # x, y of the housing, its rotations a about x and b about y; the rotor is at (x + arm b, y - arm a)
     M = np.diag([m + 2, m + 2, I_t + 0.01 + m * arm**2, I_t + 0.01 + m * arm**2])
@@ -153,7 +153,7 @@ def test_a_rotor_in_a_housing_on_unlike_springs_whirls_as_its_four_equations_say
 def test_a_car_straight_on_has_the_eigenvalues_of_the_single_track_model(sigma, V):
     """Wheels spin on their axles; with relaxation lengths 0 (two eigenvalues) and not (four)."""
     car = Car(sigma=sigma)
-    found = eigenvalues(ff.steady_motion(car.system(V), "chassis"))
+    found = eigenvalues(ff.analyses.steady_motion(car.system(V), "chassis"))
     expected = np.linalg.eigvals(car.matrix(V))
     apart = [np.abs(found - each).min() / abs(each) for each in upper(expected)]
     assert_allclose(apart, 0, atol=1e-3)  # wheels of 0.1 kg
@@ -186,7 +186,7 @@ def turning_rates(x, steer, push):
 @pytest.fixture(scope="module")
 def curve():
     """Return the car in a curve of 60 m, its steer angle and push found."""
-    return ff.steady_motion(pushed, "chassis", curvature=1 / 60, unknown={"steer": 0.04, "push": 10.0})
+    return ff.analyses.steady_motion(pushed, "chassis", curvature=1 / 60, unknown={"steer": 0.04, "push": 10.0})
 
 
 def test_a_car_in_a_steady_curve_is_trimmed_as_a_plane_one(curve):
@@ -219,7 +219,9 @@ def test_a_car_in_a_steady_curve_has_the_eigenvalues_of_a_plane_one(curve):
 
 def test_with_the_steer_angle_given_the_curvature_is_found(curve):
     steer = curve.found["steer"]
-    again = ff.steady_motion(lambda push: pushed(steer, push), "chassis", curvature=None, unknown={"push": 0.0})
+    again = ff.analyses.steady_motion(
+        lambda push: pushed(steer, push), "chassis", curvature=None, unknown={"push": 0.0}
+    )
     assert_allclose(again.curvature, 1 / 60, rtol=1e-9)
     assert_allclose(again.found["push"], curve.found["push"], rtol=1e-6)
 
@@ -249,35 +251,39 @@ def test_what_is_not_steady_is_told():
     car = Car()
     system = car.system(20.0)
     bodies = [replace(b, inertia=np.diag([1e-4, 1e-4, 1.2e-4])) if b.name == "fl" else b for b in system.bodies]
-    oval = ff.steady_motion(replace(system, bodies=bodies), "chassis")
-    with pytest.raises(ff.ModelError, match="not steady: body 'fl' spins about an axis about which its mass is not"):
+    oval = ff.analyses.steady_motion(replace(system, bodies=bodies), "chassis")
+    with pytest.raises(
+        ff.errors.ModelError, match="not steady: body 'fl' spins about an axis about which its mass is not"
+    ):
         eigenvalues(oval)
-    about = ff.steady_motion(system, "chassis").equilibrium
+    about = ff.analyses.steady_motion(system, "chassis").equilibrium
     u = about.state.u.copy()
     u[1] += 0.1
-    with pytest.raises(ff.ModelError, match=r"not steady: body 'chassis' moves at 0\.1 relative to the others"):
+    with pytest.raises(ff.errors.ModelError, match=r"not steady: body 'chassis' moves at 0\.1 relative to the others"):
         ff.linearize(system, replace(about, state=replace(about.state, u=u.ravel())), inputs=(), outputs=())
     braked = replace(system, forces=[*system.forces, ff.PointForce("f", ff.Marker("chassis"), force=(-500.0, 0, 0))])
-    with pytest.raises(ff.ModelError, match=r"not steady: forces are unbalanced by .* of the acting forces"):
+    with pytest.raises(ff.errors.ModelError, match=r"not steady: forces are unbalanced by .* of the acting forces"):
         ff.linearize(braked, about, inputs=(), outputs=())
-    with pytest.raises(ff.ConvergenceError, match=r"cannot run steadily with these values; make a parameter unknown"):
-        ff.steady_motion(braked, "chassis")
+    with pytest.raises(
+        ff.errors.ConvergenceError, match=r"cannot run steadily with these values; make a parameter unknown"
+    ):
+        ff.analyses.steady_motion(braked, "chassis")
     ahead = wheels.profile_road([-20.0, 1.2, 1.3, 3.0, 20.0], [0.0, 0.0, 0.01, 0.3, 0.3])
     ramp = replace(system, elements=[replace(each, road=ahead) for each in system.elements])
-    with pytest.raises(ff.ModelError, match=r"not steady: 0\.0183 time units later, forces are unbalanced"):
-        eigenvalues(ff.steady_motion(ramp, "chassis"))
+    with pytest.raises(ff.errors.ModelError, match=r"not steady: 0\.0183 time units later, forces are unbalanced"):
+        eigenvalues(ff.analyses.steady_motion(ramp, "chassis"))
 
 
 def test_bad_questions_are_answered_by_one_message():
     system = Car().system(20.0)
-    with pytest.raises(ff.ModelError, match=r"no body 'chasis'.*'chassis'"):
-        ff.steady_motion(system, "chasis")
-    with pytest.raises(ff.ModelError, match="expected a function that returns the system"):
-        ff.steady_motion(system, "chassis", unknown={"steer": 0.1})
-    with pytest.raises(ff.ModelError, match="speed: expected a number of at least 0"):
-        ff.steady_motion(system, "chassis", -3.0)
-    with pytest.raises(ff.ModelError, match="1/curvature"):
-        ff.steady_motion(system, "chassis", curvature=0.1, center=(0, 50, 0))
+    with pytest.raises(ff.errors.ModelError, match=r"no body 'chasis'.*'chassis'"):
+        ff.analyses.steady_motion(system, "chasis")
+    with pytest.raises(ff.errors.ModelError, match="expected a function that returns the system"):
+        ff.analyses.steady_motion(system, "chassis", unknown={"steer": 0.1})
+    with pytest.raises(ff.errors.ModelError, match="speed: expected a number of at least 0"):
+        ff.analyses.steady_motion(system, "chassis", -3.0)
+    with pytest.raises(ff.errors.ModelError, match="1/curvature"):
+        ff.analyses.steady_motion(system, "chassis", curvature=0.1, center=(0, 50, 0))
     still = replace(system, bodies=[replace(b, velocity=(0, 0, 0)) for b in system.bodies])
-    with pytest.raises(ff.ModelError, match="placed without a velocity"):
-        ff.steady_motion(still, "chassis", 10.0)
+    with pytest.raises(ff.errors.ModelError, match="placed without a velocity"):
+        ff.analyses.steady_motion(still, "chassis", 10.0)

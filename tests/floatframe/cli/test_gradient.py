@@ -50,7 +50,7 @@ def test_the_command_says_what_the_function_returns(swing):
     asked = ["-m", "hinge.angle value", "-m", "hinge.angle rate:rms", "-p", "bodies.rod.mass", "-p", "system.gravity.1"]
     told = json.loads(invoke("gradient", swing, *asked, "--json", "--method", "adjoint"))
     outputs = {"hinge.angle value": "hinge.angle value", "rms": ("hinge.angle rate", "rms")}
-    found = ff.sensitivities(str(swing), outputs, ["bodies.rod.mass", "system.gravity.1"], method="adjoint")
+    found = ff.design.sensitivities(str(swing), outputs, ["bodies.rod.mass", "system.gravity.1"], method="adjoint")
     assert_allclose(list(told["gradient"]["hinge.angle value"].values()), found.gradient[0], rtol=1e-12)
     assert_allclose(list(told["gradient"]["hinge.angle rate:rms"].values()), found.gradient[1], rtol=1e-12)
     # angle = -(m g c/2 J) t² at first, J about the hinge = 0.2 + m c²: by the weight it is angle/g

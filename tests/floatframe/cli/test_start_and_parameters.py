@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
 import cms
+import fe_models
 import floatframe as ff
 from cms.cli.app import app as cms_app
 from fe_models.foundation.units import unit_system
@@ -220,8 +221,8 @@ def test_run_runs_a_sweep_by_its_kind(folder):
 @pytest.mark.parametrize("formulation", ["absolute", "relative"])
 def test_a_turned_flexible_body_begins_sagged_and_with_its_velocity(frame, formulation):
     """A rod off the origin on a rail sags across it, does not vibrate, and keeps its speed along the rail."""
-    line = cms.BeamLine(1.0, 0.785, 2.1e9, 17500.0, 17500.0, 11200.0, 6.3e-6, 6.3e-6)
-    reduced = cms.beam_from_assumed_modes(
+    line = fe_models.beams.BeamLine(1.0, 0.785, 2.1e9, 17500.0, 17500.0, 11200.0, 6.3e-6, 6.3e-6)
+    reduced = cms.reduction.beam_from_assumed_modes(
         line, name="rod", units=unit_system("m-kg-s"), n_axial=1, n_bending=3, frame=frame
     )
     turn, along = euler_parameters_of_rotation_vector(np.array([0.4, -0.7, 0.9])), np.array([1.0, 2.0, 2.0]) / 3

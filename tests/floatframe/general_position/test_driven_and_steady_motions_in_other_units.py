@@ -22,14 +22,12 @@ from floatframe import (
     SphericalJoint,
     SpringDamper,
     System,
-    campbell,
     inverse_dynamics,
     kinematics,
     linearize,
-    root_locus,
-    steady_motion,
     system_modes,
 )
+from floatframe.analyses import campbell, root_locus, steady_motion
 from floatframe.analyses.inverse_kinematics import Target, inverse_kinematics
 from floatframe.components.bearings import Bearing
 from floatframe.components.mechanisms import slider_crank

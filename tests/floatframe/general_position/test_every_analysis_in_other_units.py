@@ -11,9 +11,6 @@ from scipy.spatial.transform import Rotation
 from fe_models.foundation.units import unit_system
 from floatframe import (
     GROUND,
-    Bushing,
-    Channel,
-    CoordinateChannel,
     Gravity,
     JointForce,
     Marker,
@@ -22,10 +19,12 @@ from floatframe import (
     SpringDamper,
     System,
     linearize,
-    named_state_space,
     static_equilibrium,
     system_modes,
 )
+from floatframe.analyses import named_state_space
+from floatframe.forces import Bushing
+from floatframe.sensors import Channel, CoordinateChannel
 from tests.floatframe.other_units import Other, in_units
 
 R = Rotation.from_rotvec([0.7, -0.4, 1.1]).as_matrix()

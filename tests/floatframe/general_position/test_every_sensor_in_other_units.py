@@ -12,12 +12,9 @@ from fe_models.body.fe_body import Interface
 from fe_models.foundation.units import unit_system
 from floatframe import (
     GROUND,
-    Bushing,
-    CoordinateCoupler,
     FlexibleBody,
     GeneralizedAlpha,
     Gravity,
-    JointCoordinate,
     JointForce,
     Marker,
     PointForce,
@@ -31,6 +28,8 @@ from floatframe import (
 )
 from floatframe.components.drives import DcMotor
 from floatframe.files.signals.signal_units import unit_factor
+from floatframe.forces import Bushing
+from floatframe.joints import CoordinateCoupler, JointCoordinate
 from floatframe.model.functions.time_functions import harmonic, polynomial_of_time
 from floatframe.results.sensors import (
     SENSORS,
@@ -79,8 +78,10 @@ def rod():
     """A beam with stress, kept nodes and a recovery table."""
     ends = [Interface(name, "nodes", np.array([k]), np.array([k / 3, 0, 0])) for name, k in (("left", 0), ("right", 3))]
     part = cms.couple(with_interfaces(beam(n=3), *ends))
-    rows = (cms.Rows("acceleration", at=("right",)), cms.Rows("net force", about=(0.1, 0.2, 0.0)))
-    reduced = cms.reduce(part, cms.craig_bampton(part, n_modes=4), recovery=[cms.RecoveryRequest("table", rows=rows)])
+    rows = (cms.reduction.Rows("acceleration", at=("right",)), cms.reduction.Rows("net force", about=(0.1, 0.2, 0.0)))
+    reduced = cms.reduce(
+        part, cms.craig_bampton(part, n_modes=4), recovery=[cms.reduction.RecoveryRequest("table", rows=rows)]
+    )
     stress = 1e9 * np.random.default_rng(4).normal(size=(len(reduced.nodes), 6, reduced.n_q))
     return replace(reduced, stress=stress)
 

@@ -13,16 +13,7 @@ import cms
 from cms.body.modal_file.file import convert_units
 from fe_models.body.fe_body import Interface
 from fe_models.foundation.units import unit_system
-from floatframe import (
-    GROUND,
-    Bushing,
-    FixedJoint,
-    FlexibleBody,
-    Gravity,
-    Marker,
-    RigidBody,
-    System,
-)
+from floatframe import GROUND, FixedJoint, FlexibleBody, Gravity, Marker, RigidBody, System
 from floatframe.durability.shaking.loads.levels import Level
 from floatframe.durability.shaking.loads.notching import ForceLimit, ResponseLimit
 from floatframe.durability.shaking.loads.random_vibration import CrossSpectrum, RandomTest
@@ -33,6 +24,7 @@ from floatframe.durability.shaking.shake import NotchRequest, ShakeJob, model_of
 from floatframe.durability.shaking.structure.damping import Damping
 from floatframe.durability.shaking.structure.model import response
 from floatframe.durability.shaking.structure.places import Observed
+from floatframe.forces import Bushing
 from floatframe.results.sensors import PlaceSensor, ReactionSensor, SpringSensor
 from tests.bodies import beam, with_interfaces
 from tests.floatframe.other_units import Other, in_units
@@ -52,9 +44,11 @@ def rod():
     places = (("left", 0), ("middle", 2), ("right", 3))
     held = [Interface(name, "nodes", np.array([k]), np.array([k / 3, 0, 0])) for name, k in places]
     part = cms.couple(with_interfaces(beam(n=3), *held))
-    rows = (cms.Rows("acceleration", at=("middle",)), cms.Rows("net force", about=(0.1, 0.2, 0.0)))
-    table = cms.RecoveryRequest("table", rows=rows)
-    body = cms.reduce(part, cms.craig_bampton(part, n_modes=4), damping=cms.ModalDamping(0.03), recovery=[table])
+    rows = (cms.reduction.Rows("acceleration", at=("middle",)), cms.reduction.Rows("net force", about=(0.1, 0.2, 0.0)))
+    table = cms.reduction.RecoveryRequest("table", rows=rows)
+    body = cms.reduce(
+        part, cms.craig_bampton(part, n_modes=4), damping=cms.reduction.ModalDamping(0.03), recovery=[table]
+    )
     stress = 1e9 * np.random.default_rng(4).normal(size=(len(body.nodes), 6, body.n_q))
     return replace(body, stress=stress)
 

@@ -8,17 +8,8 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from floatframe import (
-    GROUND,
-    Gravity,
-    JointForce,
-    Marker,
-    PrismaticJoint,
-    RevoluteJoint,
-    RigidBody,
-    System,
-    generate_fmu,
-)
+from floatframe import GROUND, Gravity, JointForce, Marker, PrismaticJoint, RevoluteJoint, RigidBody, System
+from floatframe.design import generate_fmu
 from tests.floatframe.design.generation.calls import python_function
 from tests.floatframe.other_units import SI, SIZES, in_units, other_units
 

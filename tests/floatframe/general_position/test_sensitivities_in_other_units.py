@@ -10,19 +10,17 @@ from scipy.spatial.transform import Rotation
 
 from floatframe import (
     GROUND,
-    EnergySensor,
     Gravity,
     JointForce,
     Marker,
-    PlaceSensor,
     PrismaticJoint,
-    ReactionSensor,
     RevoluteJoint,
     RigidBody,
     SpringDamper,
     System,
-    sensitivities,
 )
+from floatframe.design import sensitivities
+from floatframe.sensors import EnergySensor, PlaceSensor, ReactionSensor
 from tests.floatframe.other_units import SI, SIZES, in_units, other_units
 
 R = Rotation.from_rotvec([0.7, -0.4, 1.1]).as_matrix()

@@ -9,12 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from floatframe import (
     GROUND,
-    CoordinateCoupler,
-    CylindricalJoint,
-    Event,
     GeneralizedAlpha,
     Gravity,
-    JointCoordinate,
     JointForce,
     Marker,
     PrismaticJoint,
@@ -23,15 +19,17 @@ from floatframe import (
     SpringDamper,
     System,
     integrate,
-    joint_coordinate,
     static_equilibrium,
 )
 from floatframe.analyses.inverse_kinematics import Target, inverse_kinematics
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import ModelError
+from floatframe.joints import CoordinateCoupler, CylindricalJoint, JointCoordinate
 from floatframe.model.joints.coordinate_coupler import Limits
 from floatframe.model.rotations import euler_parameters
+from floatframe.results import joint_coordinate
 from floatframe.results.sensors import PlaceSensor
+from floatframe.simulation import Event
 from floatframe.simulation import integrate as integration
 from floatframe.simulation.event_steps import EventWatch
 

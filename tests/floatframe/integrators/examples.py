@@ -2,19 +2,8 @@
 
 import numpy as np
 
-from floatframe import (
-    GROUND,
-    EnergyDecaying,
-    EnergyMomentum,
-    FlexibleBody,
-    Gravity,
-    Marker,
-    RigidBody,
-    SphericalJoint,
-    SpringDamper,
-    System,
-    Variational,
-)
+from floatframe import GROUND, FlexibleBody, Gravity, Marker, RigidBody, SphericalJoint, SpringDamper, System
+from floatframe.integrators import EnergyDecaying, EnergyMomentum, Variational
 from floatframe.model.joints import JOINTS
 from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_matrix
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffened_body, stiffness

@@ -11,29 +11,27 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import cms
+import fe_models
 import floatframe.simulation.integrate as integration
 from fe_models.foundation.units import unit_system
 from floatframe import (
     GROUND,
-    EnergyDecaying,
-    EnergyMomentum,
     FlexibleBody,
     GeneralizedAlpha,
     Gravity,
     JointForce,
     Marker,
-    ModelError,
     PointForce,
     RevoluteJoint,
     RigidBody,
     SphericalJoint,
     SpringDamper,
     System,
-    Variational,
     integrate,
-    resume,
 )
 from floatframe.components.mechanisms import four_bar
+from floatframe.errors import ModelError
+from floatframe.integrators import EnergyDecaying, EnergyMomentum, Variational
 from floatframe.model.functions.time_functions import cycloidal_spin_up
 from floatframe.model.functions.time_functions import table as table_function
 from floatframe.model.rotations import (
@@ -43,6 +41,7 @@ from floatframe.model.rotations import (
     rotation_matrix,
     tilde,
 )
+from floatframe.simulation import resume
 from tests.floatframe.engine.structure_preserving.in_python.markers import mean_jacobian
 from tests.floatframe.engine.structure_preserving.in_python.rotation import cayley, cayley_parameters, relative_cayley
 from tests.floatframe.integrators.examples import (  # noqa: F401
@@ -210,8 +209,10 @@ def test_decaying_scheme_has_its_spectral_radius_and_is_the_conserving_one_for_o
 @pytest.mark.parametrize("rho", [0.0, 0.5, 0.9])
 def test_unresolved_modes_do_not_brake_a_falling_rod_whose_frame_stands_at_its_hinge(rho):
     """SciPy: theta'' = -(3 g/2 L) sin(theta) of a rigid rod; the axes of the frame stand at the held end."""
-    line = cms.BeamLine(1.0, 1.0, 4e9, 4e6, 6e6, 4e6, 1e-3, 1e-3)  # first bending mode: 1100 periods a second
-    rod = cms.beam_from_assumed_modes(
+    line = fe_models.beams.BeamLine(
+        1.0, 1.0, 4e9, 4e6, 6e6, 4e6, 1e-3, 1e-3
+    )  # first bending mode: 1100 periods a second
+    rod = cms.reduction.beam_from_assumed_modes(
         line, name="rod", units=unit_system("m-kg-s"), n_axial=1, n_bending=2, n_torsion=1,
         frame=cms.NodalFrame("start"),
     )  # fmt: skip

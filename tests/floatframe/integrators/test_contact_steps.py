@@ -17,7 +17,7 @@ from floatframe.model.rotations import euler_parameters_of_rotation_vector, rota
 GROUND, BODY = Marker("ground", position=np.zeros(3)), Marker("b", position=np.zeros(3))
 OF_CONTACT = 0.01  #: relative error of a speed after a contact
 FORMULATIONS = ["absolute", "relative"]
-SCHEMES = [ff.EnergyMomentum(), ff.EnergyDecaying(), ff.Variational()]
+SCHEMES = [ff.integrators.EnergyMomentum(), ff.integrators.EnergyDecaying(), ff.integrators.Variational()]
 
 
 def ball_and_plane(gap, *, speed=3.0, scale=1.0, **numbers):
@@ -26,7 +26,7 @@ def ball_and_plane(gap, *, speed=3.0, scale=1.0, **numbers):
         "b", scale, 0.004 * scale**3 * np.eye(3), position=(0, 0, (0.1 + gap) * scale), velocity=(0, 0, -speed * scale)
     )
     numbers = {"exponent": 1.0, "stiffness": 1e6 * scale, "slow": 1e-3 * scale} | numbers
-    contact = ff.SphereContact("c", GROUND, BODY, radius_b=0.1 * scale, **numbers)
+    contact = ff.forces.SphereContact("c", GROUND, BODY, radius_b=0.1 * scale, **numbers)
     return System([body], [], [contact])
 
 
@@ -58,7 +58,9 @@ def test_balls_meet_on_a_tilted_carrier_that_moves_far_from_the_origin():
     p = euler_parameters_of_rotation_vector(tilt)
     heavy = RigidBody("heavy", 3.0, 0.1 * np.eye(3), position=place, orientation=p, velocity=drift)
     light = RigidBody("light", 1.0, 0.01 * np.eye(3), position=place + 0.5 * n, velocity=drift - 20.0 * n)
-    contact = ff.SphereContact("c", Marker("heavy"), Marker("light"), radius_b=0.1, stiffness=1e7, restitution=0.6)
+    contact = ff.forces.SphereContact(
+        "c", Marker("heavy"), Marker("light"), radius_b=0.1, stiffness=1e7, restitution=0.6
+    )
     motion = ff.integrate(System([heavy, light], [], [contact]), GeneralizedAlpha(0.8), 0.05, 5e-3)
     v = motion.body("light").v[-1] - motion.body("heavy").v[-1]
     assert_allclose(v @ n, 12.0, rtol=OF_CONTACT)
@@ -73,7 +75,7 @@ def steel_ball(gap, speed):
     m, stiffness = 7800 * 4 / 3 * np.pi * R**3, 4 / 3 * 1.15e11 * np.sqrt(R)
     body = RigidBody("b", m, 0.4 * m * R**2 * np.eye(3), position=place + (R + gap) * n, velocity=-speed * n)
     plane = Marker("ground", position=place)
-    contact = ff.SphereContact("c", plane, BODY, radius_b=R, stiffness=stiffness, exponent=1.5, axis=n)
+    contact = ff.forces.SphereContact("c", plane, BODY, radius_b=R, stiffness=stiffness, exponent=1.5, axis=n)
     return System([body], [], [contact]), n
 
 
@@ -98,7 +100,7 @@ def test_schemes_from_body_to_body_resolve_contacts(scheme):
         motion = ff.integrate(ball_and_plane(gap, restitution=0.5), scheme, 0.2, 0.01, watch="off")
         assert_allclose(motion.body("b").v[-1, 2], 1.5, rtol=OF_CONTACT)
         body = RigidBody("b", 1.0, 0.004 * np.eye(3), position=(0, 0, 15 * gap), velocity=(0, 0, -100))
-        contact = ff.SphereContact("c", GROUND, BODY, radius_b=0.05, radius_a=0.05, stiffness=1e7)
+        contact = ff.forces.SphereContact("c", GROUND, BODY, radius_b=0.05, radius_a=0.05, stiffness=1e7)
         motion = ff.integrate(System([body], [], [contact]), scheme, 0.05, 0.01, watch="off")
         assert_allclose(motion.body("b").v[-1, 2], 100.0, rtol=OF_CONTACT)
     lash = clearances.Backlash("lash", GROUND, BODY, lower=-0.01, upper=0.01, stiffness=1e6, axis=(0, 0, 1))
@@ -114,7 +116,7 @@ def test_fast_spheres_do_not_pass_through_each_other(formulation, error_toleranc
     """100 m/s, a way of 1 m in a step beside spheres of 50 mm."""
     for gap in (0.85, 0.95):
         body = RigidBody("b", 1.0, 0.004 * np.eye(3), position=(0, 0, gap + 0.1), velocity=(0, 0, -100))
-        contact = ff.SphereContact("c", GROUND, BODY, radius_b=0.05, radius_a=0.05, stiffness=1e7)
+        contact = ff.forces.SphereContact("c", GROUND, BODY, radius_b=0.05, radius_a=0.05, stiffness=1e7)
         method = GeneralizedAlpha(0.8, error_tolerance=error_tolerance)
         motion = ff.integrate(System([body], [], [contact]), method, 0.1, 0.01, formulation=formulation)
         assert_allclose(motion.body("b").v[-1, 2], 100.0, rtol=OF_CONTACT)
@@ -124,7 +126,7 @@ def test_a_sphere_that_grazes_another_between_two_steps_is_turned_aside():
     """Elastic spheres without friction: the velocity is mirrored at the plane of the touch."""
     offset, R = 0.06, 0.1  # of the way from the middle; sum of the radii
     body = RigidBody("b", 1.0, 0.004 * np.eye(3), position=(offset, 0, 0.5), velocity=(0, 0, -100))
-    contact = ff.SphereContact("c", GROUND, BODY, radius_b=0.05, radius_a=0.05, stiffness=1e13)
+    contact = ff.forces.SphereContact("c", GROUND, BODY, radius_b=0.05, radius_a=0.05, stiffness=1e13)
     motion = ff.integrate(System([body], [], [contact]), GeneralizedAlpha(0.8), 0.01, 0.01)
     n = np.array([offset, 0, np.sqrt(R**2 - offset**2)]) / R
     v = np.array([0, 0, -100.0])
@@ -174,7 +176,7 @@ def test_a_pin_that_tumbles_in_its_bearing_gains_no_energy():
 def test_a_ball_that_rests_takes_whole_steps():
     """Held by its weight on a contact of 6 ms, a hundred steps of 10 ms."""
     body = RigidBody("b", 1.0, 0.004 * np.eye(3), position=(0, 0, 0.1 - 9.81 / 1e6))
-    contact = ff.SphereContact("c", GROUND, BODY, radius_b=0.1, stiffness=1e6, exponent=1.0, restitution=0.5)
+    contact = ff.forces.SphereContact("c", GROUND, BODY, radius_b=0.1, stiffness=1e6, exponent=1.0, restitution=0.5)
     motion = ff.integrate(System([body], [], [Gravity((0, 0, -9.81)), contact]), GeneralizedAlpha(0.8), 1.0, 0.01)
     assert motion.head.summary["n_steps"] == 100
     assert_allclose(motion.body("b").r[-1, 2], 0.1 - 9.81e-6, atol=1e-9)
@@ -193,7 +195,7 @@ def test_steps_near_a_contact_do_not_depend_on_the_calls_that_make_them():
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_a_contact_that_the_least_step_does_not_resolve_is_refused_by_name(formulation):
     with pytest.raises(
-        ff.ConvergenceError, match=r"from t = 0.0\d* failed: contact 'c' takes steps of .*h_min = 0.001"
+        ff.errors.ConvergenceError, match=r"from t = 0.0\d* failed: contact 'c' takes steps of .*h_min = 0.001"
     ) as error:
         ff.integrate(ball_and_plane(0.06), GeneralizedAlpha(0.8, h_min=1e-3), 0.2, 0.01, formulation=formulation)
     assert "give a smaller h_min or h, or a softer contact" in str(error.value)
@@ -202,12 +204,12 @@ def test_a_contact_that_the_least_step_does_not_resolve_is_refused_by_name(formu
 @pytest.mark.parametrize("method", ["BDF", "DOP853"])
 def test_solvers_with_steps_of_their_own_pass_over_no_contact(method):
     """Nothing changes before the contact, so that a step grows over it; the sphere is beyond the other at both ends."""
-    pass_over_no_contact(ff.RelativeOde(method))
+    pass_over_no_contact(ff.integrators.RelativeOde(method))
 
 
 def test_ida_passes_over_no_contact():
     pytest.importorskip("sksundae", reason="the extra 'ida' is not installed")
-    pass_over_no_contact(ff.Ida(1e-5, 1e-7))
+    pass_over_no_contact(ff.integrators.Ida(1e-5, 1e-7))
 
 
 def pass_over_no_contact(method):
@@ -215,7 +217,7 @@ def pass_over_no_contact(method):
     place, n = np.array([300.0, 400.0, -500.0]), np.array([2.0, -1.0, 2.0]) / 3
     body = RigidBody("b", 1.0, 0.004 * np.eye(3), position=place + 0.95 * n, velocity=-100.0 * n)
     other = Marker("ground", position=place)
-    contact = ff.SphereContact("c", other, BODY, radius_a=0.05, radius_b=0.05, stiffness=1e7)
+    contact = ff.forces.SphereContact("c", other, BODY, radius_a=0.05, radius_b=0.05, stiffness=1e7)
     motion = ff.integrate(System([body], [], [contact]), method, 0.1, 0.05)
     assert_allclose(motion.body("b").v[-1], 100.0 * n, rtol=0, atol=0.1)
 
@@ -263,7 +265,7 @@ def test_a_tyre_that_lands_in_too_long_steps_is_told(stiffness):
             )
             try:
                 motion = ff.integrate(System([body], elements=[tyre]), GeneralizedAlpha(0.8), 0.2, h)
-            except ff.ConvergenceError:
+            except ff.errors.ConvergenceError:
                 continue
             is_off = abs(motion.body("b").v[-1, 2] - 3.0) > 0.05 * 3.0
             n_off += is_off
@@ -300,5 +302,5 @@ def test_an_element_that_names_its_gap_is_met_in_short_steps():
 
     assert_allclose(speed_after({"gap": GapSpring(1e6)}), -3.0, rtol=OF_CONTACT)
     assert abs(speed_after({}) + 3.0) > 0.1  # so that this test may fail
-    with pytest.raises(ff.ModelError, match="gaps: expected names of its outputs with a GapSpring each"):
+    with pytest.raises(ff.errors.ModelError, match="gaps: expected names of its outputs with a GapSpring each"):
         speed_after({"way": GapSpring(1e6)})

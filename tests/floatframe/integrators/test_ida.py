@@ -6,18 +6,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import (
-    FlexibleBody,
-    GeneralizedAlpha,
-    Gravity,
-    Ida,
-    Marker,
-    ModelError,
-    SphericalJoint,
-    System,
-    integrate,
-)
+from floatframe import FlexibleBody, GeneralizedAlpha, Gravity, Marker, SphericalJoint, System, integrate
 from floatframe.components.mechanisms import pendulum as rigid_pendulum
+from floatframe.errors import ModelError
+from floatframe.integrators import Ida
 from tests.floatframe.integrators.examples import pendulum
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 

@@ -16,12 +16,12 @@ from floatframe import (
     Marker,
     RevoluteJoint,
     RigidBody,
-    SphereContact,
     SpringDamper,
     System,
     integrate,
 )
 from floatframe.components.mechanisms import four_bar, slider_crank
+from floatframe.forces import SphereContact
 from tests.floatframe.integrators.examples import pendulum
 from tests.floatframe.model.bodies.examples import spinning
 

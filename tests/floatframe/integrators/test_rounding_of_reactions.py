@@ -4,17 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import (
-    GROUND,
-    GeneralizedAlpha,
-    Gravity,
-    Marker,
-    RigidBody,
-    SphericalJoint,
-    System,
-    consistent_state,
-    integrate,
-)
+from floatframe import GROUND, GeneralizedAlpha, Gravity, Marker, RigidBody, SphericalJoint, System, integrate
+from floatframe.analyses import consistent_state
 
 FALL = np.array([1.0, -2.0, -9.0])
 PLACE = np.array([300.0, -200.0, 100.0])

@@ -6,26 +6,23 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import floatframe.simulation.integrate as integration
 from floatframe import (
-    ConvergenceError,
     FlexibleBody,
     GeneralizedAlpha,
     Gravity,
     JointForce,
     Marker,
-    ModelError,
     PrismaticJoint,
     RevoluteJoint,
     RigidBody,
     System,
-    hht,
     integrate,
-    newmark,
-    resume,
-    trapezoidal,
 )
 from floatframe.components.mechanisms import slider_crank
+from floatframe.errors import ConvergenceError, ModelError
+from floatframe.integrators import hht, newmark, trapezoidal
 from floatframe.model.functions.time_functions import cycloidal_spin_up
 from floatframe.model.rotations import rotation_matrix
+from floatframe.simulation import resume
 from tests.floatframe.integrators.examples import pendulum
 from tests.floatframe.model.bodies.examples import spinning
 from tests.floatframe.orders import slope

@@ -11,23 +11,21 @@ from numpy.testing import assert_allclose
 
 import cms
 from floatframe import (
-    ConvergenceError,
-    DistanceJoint,
     FixedJoint,
     FlexibleBody,
     GeneralizedAlpha,
     Gravity,
     Marker,
-    PointOnLine,
     RevoluteJoint,
     RigidBody,
     SphericalJoint,
     System,
-    UniversalJoint,
     integrate,
-    trapezoidal,
 )
 from floatframe.components.mechanisms.linkages import slider_crank
+from floatframe.errors import ConvergenceError
+from floatframe.integrators import trapezoidal
+from floatframe.joints import DistanceJoint, PointOnLine, UniversalJoint
 from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_exp, rotation_matrix
 from tests.bodies import beam
 from tests.floatframe.orders import slope

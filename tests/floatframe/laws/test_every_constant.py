@@ -166,7 +166,7 @@ def law_with(form, cls, key, value):
         return None
     try:
         return replace(form, element=element).law()
-    except floatframe.ModelError:
+    except floatframe.errors.ModelError:
         return None
 
 
@@ -190,5 +190,5 @@ def with_number(part, cls, key, value):
             changed[key] = value
     try:
         return type(part)(**changed)
-    except floatframe.ModelError:
+    except floatframe.errors.ModelError:
         return part

@@ -7,8 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 import cms
-from floatframe import GeneralizedAlpha, ModelError, integrate
+from floatframe import GeneralizedAlpha, integrate
 from floatframe.components import rails
+from floatframe.errors import ModelError
 from floatframe.files.system_file.read_system import read_system
 from floatframe.machines import copy_machine
 from floatframe.machines.bogie import (

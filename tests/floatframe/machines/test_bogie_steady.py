@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import GeneralizedAlpha, ModelError, integrate, linearize
+from floatframe import GeneralizedAlpha, integrate, linearize
 from floatframe.components import rails
+from floatframe.errors import ModelError
 from floatframe.machines.bogie import RailVehicle, in_circle, steady_motion_of, vehicle
 from floatframe.machines.bogie.running import lateral_modes
 from floatframe.machines.bogie.unstable_branch import bracket_of_unstable_cycle, hunted

@@ -3,8 +3,8 @@
 import pytest
 from typer.testing import CliRunner
 
-from floatframe import ModelError
 from floatframe.cli.app import app
+from floatframe.errors import ModelError
 from floatframe.machines import MACHINES, copy_machine, machine_files
 
 

@@ -36,7 +36,9 @@ def steered(system, move, h):
         ff.JointForce(f"motor {joint}", joint, "angle", motor=move.torque_function(f"{joint}/angle"))
         for joint in study.TARGET
     )
-    return ff.integrate(replace(system, forces=motors), ff.trapezoidal(), study.DURATION, h, formulation="relative")
+    return ff.integrate(
+        replace(system, forces=motors), ff.integrators.trapezoidal(), study.DURATION, h, formulation="relative"
+    )
 
 
 def test_the_links_are_strips_with_a_mass_at_their_ends(parts):
@@ -52,7 +54,7 @@ def test_the_links_are_strips_with_a_mass_at_their_ends(parts):
 def missed(system, move):
     """Return how far the engine is from the optimiser, (n_z,), at most over the move, and at its end."""
     h = 2.5e-4
-    model, motion = ff.relative_model(system), steered(system, move, h)
+    model, motion = ff.analyses.relative_model(system), steered(system, move, h)
     every = round((move.t[1] - move.t[0]) / h)
     z = np.array([model.positions(motion.state(every * k))[0] for k in range(len(move.t))])
     return np.abs(z - move.z).max(axis=0), np.abs(z - move.z)[-1]
@@ -75,7 +77,7 @@ def test_the_least_effort_of_a_rigid_link_is_that_of_a_quadratic_programme(parts
     """Straight lines of torque integrated exactly: linear equations for the least cost between rest and rest."""
     n, h, s = 60, 1.0 / 60, SMOOTHING
     one = ff.System(*(each[:1] for each in systems_parts(flexible_arm.arm(parts, is_rigid=True))), name="one")
-    inertia = float(ff.relative_model(one).mass_matrix(np.zeros(1))[0, 0])
+    inertia = float(ff.analyses.relative_model(one).mass_matrix(np.zeros(1))[0, 0])
     move = flexible_arm.optimal_move(one, {"shoulder/angle": 1.0}, 1.0, torque=[8.0], n_intervals=n)
     bend = np.diff(np.eye(n + 1), 2, axis=0) / h**2
     weight = h * (np.eye(n + 1) + s**4 * bend.T @ bend)
@@ -103,7 +105,7 @@ def test_computed_torque_leads_a_rigid_arm_exactly(parts):
     def error(h):
         control = flexible_arm.computed_torque(rigid, aims, study.BANDWIDTH, (100.0, 100.0))
         each = flexible_arm.controlled(rigid, control, t_end=study.DURATION, h=h)
-        columns = ff.measured(each.system, each.motion)["elbow"].columns["value"]
+        columns = ff.sensors.measured(each.system, each.motion)["elbow"].columns["value"]
         return np.abs(columns - aims["elbow"].at(each.motion.t)).max()
 
     coarse, fine = error(2e-3), error(1e-3)
@@ -137,15 +139,15 @@ def test_motors_keep_their_limits_and_energy_is_theirs(motions):
 def test_what_cannot_be_is_told(parts):
     rigid = flexible_arm.arm(parts, is_rigid=True)
     move = flexible_arm.optimal_move
-    with pytest.raises(ff.ModelError, match="target: expected some of shoulder/angle, elbow/angle, got wrist"):
+    with pytest.raises(ff.errors.ModelError, match="target: expected some of shoulder/angle, elbow/angle, got wrist"):
         move(rigid, {"wrist": 1.0}, 1.0, torque=[1.0])
-    with pytest.raises(ff.ModelError, match="a torque above 0 for each motor"):
+    with pytest.raises(ff.errors.ModelError, match="a torque above 0 for each motor"):
         move(rigid, {"shoulder/angle": 1.0}, 1.0, torque=[1.0, 1.0])
-    with pytest.raises(ff.ConvergenceError, match="allow more time or torque"):
+    with pytest.raises(ff.errors.ConvergenceError, match="allow more time or torque"):
         move(rigid, {"shoulder/angle": 1.0, "elbow/angle": 0.0}, 0.2, torque=[1.0, 1.0], n_intervals=10)
-    with pytest.raises(ff.ModelError, match=r"expected a tree of rigid bodies on hinges, got .*mode 1"):
+    with pytest.raises(ff.errors.ModelError, match=r"expected a tree of rigid bodies on hinges, got .*mode 1"):
         flexible_arm.computed_torque(flexible_arm.arm(parts), {}, 1.0, ())
-    with pytest.raises(ff.ModelError, match="expected its hinges shoulder, elbow, got elbow"):
+    with pytest.raises(ff.errors.ModelError, match="expected its hinges shoulder, elbow, got elbow"):
         flexible_arm.computed_torque(rigid, {"elbow": quintic(0.0, 1.0, 0.0, 1.0)}, 1.0, (1.0,))
-    with pytest.raises(ff.ModelError, match="expected a function of polynomials"):
+    with pytest.raises(ff.errors.ModelError, match="expected a function of polynomials"):
         control.rate_of(harmonic(1.0, 1.0))

@@ -117,7 +117,9 @@ def test_the_steady_turn_is_where_the_run_ends_and_it_is_stable(turns, parts, is
     motion = steady_turn(ff.read_system(parts[0] / name)[0], float(turns[is_rigid].speed[-1]))
     assert_allclose(1 / motion.curvature, turns[is_rigid].radius, rtol=0.01)
     loads = [
-        ff.element_motion(motion.system, ff.snapshot(motion.system, motion.equilibrium, t=100.0), f"tyre_{wheel}")
+        ff.results.element_motion(
+            motion.system, ff.analyses.snapshot(motion.system, motion.equilibrium, t=100.0), f"tyre_{wheel}"
+        )
         for wheel in ("front_left", "front_right", "rear_left", "rear_right")
     ]
     found = [float(each.outputs["Fz"][0]) for each in loads]

@@ -29,7 +29,7 @@ def folder(tmp_path_factory):
 def dropped(folder, t_end, h, **changes):
     system, _ = ff.read_system(folder / "drop.toml", changes)
     motion = ff.integrate(system, METHOD, t_end, h)
-    strut, tyre = (ff.element_motion(system, motion, name).outputs for name in ("strut", "tyre"))
+    strut, tyre = (ff.results.element_motion(system, motion, name).outputs for name in ("strut", "tyre"))
     return motion, strut, tyre
 
 
@@ -89,8 +89,8 @@ def test_a_standing_wheel_spins_up_by_the_friction_of_the_ground_and_the_piston_
 def test_a_retracting_gear_follows_its_circles_and_the_jack_gives_what_it_gains(folder):
     system, _ = ff.read_system(folder / "retraction.toml")
     motion = ff.integrate(system, METHOD, 7.0, 4e-3)
-    theta = ff.joint_coordinate(system, motion, "hinge", "angle").value
-    jack = ff.element_motion(system, motion, "hydraulics").outputs
+    theta = ff.results.joint_coordinate(system, motion, "hinge", "angle").value
+    jack = ff.results.element_motion(system, motion, "hydraulics").outputs
     exact = retraction(theta)
     assert theta[-1] > np.radians(88)
     assert_allclose(jack["stroke jack"] + 0.4, exact.jack, rtol=0, atol=1e-9)
@@ -120,7 +120,9 @@ def test_an_aircraft_stands_on_its_three_gears_by_the_rule_of_levers(aircraft):
         moved = motion.body(body.name)
         weight += G * mass
         moment += G * mass * (moved.r[0] + rotation_matrix(moved.p[0]) @ centre)[0]
-    loads = {name: ff.element_motion(system, motion, f"tyre_{name}").outputs for name in ("left", "right", "nose")}
+    loads = {
+        name: ff.results.element_motion(system, motion, f"tyre_{name}").outputs for name in ("left", "right", "nose")
+    }
     assert_allclose(sum(each["Fz"][0] for each in loads.values()), weight, rtol=1e-8)
     assert_allclose(sum(each["Fz"][0] * each["px"][0] for each in loads.values()), moment, rtol=0, atol=1e-4 * weight)
     assert_allclose(loads["left"]["Fz"][0], loads["right"]["Fz"][0], rtol=1e-6)
@@ -136,14 +138,17 @@ def test_an_aircraft_lands_on_its_main_gears_with_the_lift_of_its_attitude(aircr
     system, _ = ff.read_system(aircraft)
     motion = ff.integrate(system, METHOD, 0.3, 1e-3)
     loads = {
-        name: ff.element_motion(system, motion, f"tyre_{name}").outputs["Fz"] for name in ("left", "right", "nose")
+        name: ff.results.element_motion(system, motion, f"tyre_{name}").outputs["Fz"]
+        for name in ("left", "right", "nose")
     }
     first = {name: motion.t[np.argmax(load > 100)] for name, load in loads.items()}
     assert first["left"] == first["right"] < 0.01 < first["nose"]
     assert_allclose(loads["left"], loads["right"], rtol=0, atol=1e-6 * loads["left"].max())
     tip = measurement_of(system, motion, "tip").columns["z"]
     assert tip.max() > 0.1  # the lift bends it up
-    left, right = (ff.element_motion(system, motion, f"lift_{side}_outer").outputs for side in ("left", "right"))
+    left, right = (
+        ff.results.element_motion(system, motion, f"lift_{side}_outer").outputs for side in ("left", "right")
+    )
     assert_allclose(left["lift"], right["lift"], rtol=1e-6)
     sinks = np.arctan2(2.0, 40.0) + np.radians(4)  # of the path and of the nose
     assert_allclose(left["alpha"][0], sinks, rtol=1e-6)

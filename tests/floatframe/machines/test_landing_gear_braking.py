@@ -24,7 +24,7 @@ def folder(tmp_path_factory):
 def braked(folder, t_end, h, **changes):
     system, _ = ff.read_system(folder / "braking.toml", changes)
     motion = ff.integrate(system, METHOD, t_end, h)
-    brake, tyre = (ff.element_motion(system, motion, name).outputs for name in ("brake", "tyre"))
+    brake, tyre = (ff.results.element_motion(system, motion, name).outputs for name in ("brake", "tyre"))
     return system, motion, brake, tyre
 
 
@@ -116,5 +116,5 @@ def test_without_anti_skid_the_wheel_locks_and_the_leg_walks_at_its_own_frequenc
     swing = walk[wet] - np.polyval(np.polyfit(t[wet], walk[wet], 2), t[wet])
     ups = t[wet][1:][(swing[:-1] < 0) & (swing[1:] >= 0)]
     found = (len(ups) - 1) / (ups[-1] - ups[0])
-    stroke = ff.element_motion(system, motion, "strut").outputs["stroke"][wet].mean()
+    stroke = ff.results.element_motion(system, motion, "strut").outputs["stroke"][wet].mean()
     assert_allclose(found, walking_frequency(stroke), rtol=0.03)

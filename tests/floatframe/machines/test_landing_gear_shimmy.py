@@ -111,7 +111,7 @@ def test_the_critical_speed_is_that_by_hand_and_a_damper_takes_it_away(gear):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if eigenvalues(middle, 4.0).real.max() < 0 else (low, middle)
     assert_allclose(critical_speed(gear(), 20.0, 23.0, tolerance=0.1), low, rtol=1e-2)
-    with pytest.raises(ff.ModelError, match="expected decay at 20 m/s and growth at 60 m/s"):
+    with pytest.raises(ff.errors.ModelError, match="expected decay at 20 m/s and growth at 60 m/s"):
         critical_speed(gear(**{"forces.links.damping": 40.0}), 20.0, 60.0)
 
 
@@ -121,7 +121,7 @@ def amplitudes(gear, speed, blow, ends):
     changes |= {"bodies.wheel.omega_B": [0, speed / 0.3421, 0], "forces.blow.force": [0, blow, 0]}
     system = gear(**changes)
     motion = ff.integrate(system, ff.GeneralizedAlpha(0.9, 1e-8), ends[-1], 1e-3)
-    angle = ff.joint_coordinate(system, motion, "swivel", "angle").value
+    angle = ff.results.joint_coordinate(system, motion, "swivel", "angle").value
     spans = [(motion.t > end - 0.1) & (motion.t <= end) for end in ends]
     return [np.ptp(angle[span]) / 2 for span in spans], motion.body("carriage").v[spans[-1], 0].mean()
 

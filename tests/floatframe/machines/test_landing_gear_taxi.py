@@ -150,7 +150,7 @@ def test_flexible_wings_roll_sagged_under_their_weight_until_the_bump_comes(fold
 
 
 def test_the_aircraft_that_taxis_is_the_one_that_lands(folder):
-    lands, taxis = (read_parametric(folder / name, ff.ModelError) for name in ("aircraft.toml", "taxi.toml"))
+    lands, taxis = (read_parametric(folder / name, ff.errors.ModelError) for name in ("aircraft.toml", "taxi.toml"))
     placing = {"position", "rotation_vector", "euler_parameters", "velocity", "omega_B"}
     for name, body in taxis["bodies"].items():
         one, other = ({k: v for k, v in each.items() if k not in placing} for each in (body, lands["bodies"][name]))

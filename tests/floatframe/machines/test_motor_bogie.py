@@ -11,22 +11,19 @@ from scipy.linalg import expm
 import cms
 from floatframe import (
     GROUND,
-    Bushing,
-    CoordinateCoupler,
     GeneralizedAlpha,
-    JointCoordinate,
     JointForce,
     Marker,
     RevoluteJoint,
     RigidBody,
     System,
-    element_motion,
     integrate,
-    measured,
     read_system,
 )
 from floatframe.components.drives import InductionMotor
 from floatframe.components.rails import Wheelset, height_on_rails
+from floatframe.forces import Bushing
+from floatframe.joints import CoordinateCoupler, JointCoordinate
 from floatframe.machines import copy_machine, parameters_of
 from floatframe.machines.motor_bogie import SIX_STEPS, Motor, MotorBogie
 from floatframe.machines.motor_bogie.closed_forms import (
@@ -37,6 +34,8 @@ from floatframe.machines.motor_bogie.closed_forms import (
     torque_over_speed,
 )
 from floatframe.machines.motor_bogie.plots import at_rest, modes_of, predicted_lines
+from floatframe.results import element_motion
+from floatframe.sensors import measured
 
 MOTOR = Motor()
 UNBALANCED = ((-1, 0.03),)

@@ -116,9 +116,9 @@ def coarse(tmp_path_factory):
     track = Defect(vertical=0.5e-3, lateral=0.2e-3, begin=0.3, rest=0.0)  # small: all is linear
     path = write_railway_engine(folder, "defect", track=track, part=EngineBody(pitch=3.0), size=3.0)
     body = job_body(read_job(folder / "carbody.toml"))
-    with cms.Families(lean_body(body)) as families:
+    with cms.modes.Families(lean_body(body)) as families:
         reduced = cms.reduce(
-            families, cms.guyan(families), damping=RayleighDamping(0.0, BETA), stress=False, geometric=False
+            families, cms.modes.guyan(families), damping=RayleighDamping(0.0, BETA), stress=False, geometric=False
         )
     cms.write(reduced, folder / "carbody.h5")
     system, run = read_system(path)

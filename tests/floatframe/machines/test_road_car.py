@@ -97,8 +97,8 @@ def test_wheels_move_as_circles_and_spheres_say(folder):
 def posts(folder, support, heights):
     """Return the forces of the posts at rest, (4,) [N]."""
     system = on_posts(folder, support, [{"type": "constant", "value": float(z)} for z in heights])
-    rest = ff.snapshot(system, ff.static_equilibrium(system))
-    return np.array([ff.coupler_motion(system, rest, f"post_{corner}").force[0, 0] for corner in CORNERS])
+    rest = ff.analyses.snapshot(system, ff.static_equilibrium(system))
+    return np.array([ff.results.coupler_motion(system, rest, f"post_{corner}").force[0, 0] for corner in CORNERS])
 
 
 @pytest.mark.parametrize("support", ["hydraulic", "bars"])
@@ -155,13 +155,15 @@ def test_the_driver_knows_where_the_car_is_on_the_ground(folder):
     """Far down the road and turned about all axes: place and longitudinal axis are those of the body."""
     r, p = np.array([120.0, -3.0, 0.4]), np.array([0.9, 0.15, -0.2, 0.35]) / np.linalg.norm([0.9, 0.15, -0.2, 0.35])
     car = ff.RigidBody("car", mass=1.0, inertia=np.eye(3), position=r, orientation=p)
-    terms = read_parametric(folder / "lane_change.toml", ff.ModelError)["elements"]["driver"]["terms"]
+    terms = read_parametric(folder / "lane_change.toml", ff.errors.ModelError)["elements"]["driver"]["terms"]
     driver = ExpressionElement(
         "driver", {"car": ff.Marker("car"), "road": ff.Marker("ground")}, terms=terms,
         outputs={name: name for name in ("car_x", "car_y", "axis_x", "axis_y")},
     )  # fmt: skip
     system = ff.System(bodies=[car], elements=[driver])
-    seen = ff.element_motion(system, ff.snapshot(system, ff.consistent_state(system).state), "driver").outputs
+    seen = ff.results.element_motion(
+        system, ff.analyses.snapshot(system, ff.analyses.consistent_state(system).state), "driver"
+    ).outputs
     assert_allclose([seen[key][0] for key in driver.outputs], [*r[:2], *rotation_matrix(p)[:2, 0]], rtol=0, atol=1e-9)
 
 
@@ -176,7 +178,7 @@ def test_the_study_of_the_suspension_runs(folder, tmp_path):
     begin, end = text.index("[parameters.bar_rear]"), text.index("[objectives.side_slip]")
     text = "workers = 1\n" + text[:begin] + text[end:]
     (tmp_path / "study.toml").write_text(re.sub("iterations = .*", "iterations = 1", text))
-    best = ff.optimize(ff.read_design(tmp_path / "study.toml"))
+    best = ff.design.optimize(ff.design.read_design(tmp_path / "study.toml"))
     start, changed = (row.evaluation for row in best.history[:2])
     assert (start.values, changed.values) == ((800.0,), (836.0,))
     roll, stiffer = start.numbers[2][0], changed.numbers[2][0]

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import GeneralizedAlpha, Marker, PlaceSensor, RigidBody, integrate, measured
+from floatframe import GeneralizedAlpha, Marker, RigidBody, integrate
 from floatframe.pictures.animation import motion_scene
 from floatframe.pictures.film_times import film_times
 from floatframe.pictures.glyphs import BUSHING_COLOR, JOINT_COLOR, SPRING_COLOR, glyphs
 from floatframe.pictures.stage import box_of
+from floatframe.sensors import PlaceSensor, measured
 from tests.floatframe.analyses.examples import machine
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -7,13 +7,10 @@ from typer.testing import CliRunner
 
 from floatframe import (
     GROUND,
-    Bushing,
     FlexibleBody,
     Gravity,
     Marker,
-    ModelError,
     PrismaticJoint,
-    ResultsError,
     RevoluteJoint,
     RigidBody,
     SphericalJoint,
@@ -23,6 +20,8 @@ from floatframe import (
     system_modes,
 )
 from floatframe.cli.app import app
+from floatframe.errors import ModelError, ResultsError
+from floatframe.forces import Bushing
 from floatframe.pictures.body_colors import VON_MISES
 from floatframe.pictures.glyphs import BUSHING_COLOR, JOINT_COLOR, SPRING_COLOR
 from floatframe.pictures.mode_film import mode_scene

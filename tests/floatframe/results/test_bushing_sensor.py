@@ -7,22 +7,12 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from floatframe import (
-    GROUND,
-    Bushing,
-    BushingSensor,
-    GeneralizedAlpha,
-    Marker,
-    ModelError,
-    RigidBody,
-    System,
-    integrate,
-    linearize,
-    measured,
-    static_equilibrium,
-    steady_rotation,
-)
+from floatframe import GROUND, GeneralizedAlpha, Marker, RigidBody, System, integrate, linearize, static_equilibrium
+from floatframe.analyses import steady_rotation
+from floatframe.errors import ModelError
+from floatframe.forces import Bushing
 from floatframe.results.sensors.elements import scalars
+from floatframe.sensors import BushingSensor, measured
 from tests.floatframe.analyses.examples import compare, machine, rotor
 
 K = np.diag([40.0, 50, 60, 3, 4, 5]) + 0.3

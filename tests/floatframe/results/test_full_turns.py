@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import ResultsError
+from floatframe.errors import ResultsError
 from floatframe.results.full_turns import followed_angle
 
 

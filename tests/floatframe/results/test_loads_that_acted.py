@@ -10,34 +10,29 @@ import cms
 import fe_models as fm
 from floatframe import (
     GROUND,
-    BodyLoad,
-    Channel,
-    ElongationSensor,
-    Event,
     FixedJoint,
     FlexibleBody,
     GeneralizedAlpha,
-    InterfaceForceSensor,
     Marker,
-    ModelError,
     PointForce,
-    RecoverySensor,
-    ResultsError,
     System,
     integrate,
     linearize,
-    measured,
     read_results,
-    snapshot,
     static_equilibrium,
 )
+from floatframe.analyses import snapshot
 from floatframe.engine.compiling.file_frames import rows_of_file
 from floatframe.engine.compiling.system import compiled_system
+from floatframe.errors import ModelError, ResultsError
 from floatframe.files.cosimulation.unit import Unit
+from floatframe.forces import BodyLoad
 from floatframe.model.rotations import rotation_matrix
 from floatframe.results.results_file import MemorySource
 from floatframe.results.trajectory import Trajectory
 from floatframe.results.writer import arrays_of
+from floatframe.sensors import Channel, ElongationSensor, InterfaceForceSensor, RecoverySensor, measured
+from floatframe.simulation import Event
 from tests.floatframe.analyses.examples import compare
 
 L, WIDTH, E_STEEL = 1.0, 0.03, 210e9  #: m, Pa
@@ -50,18 +45,21 @@ METHOD = GeneralizedAlpha(rho_inf=0.6)
 
 def cantilever(width=WIDTH, frame=None, n_modes=2, axes=None, **options):
     """A steel beam of 8 elements, interfaces "foot" and "tip", a load case in its middle and rows of its foot."""
-    mesh = fm.straight_line((0, 0, 0), (L, 0, 0), 8)
+    mesh = fm.beams.straight_line((0, 0, 0), (L, 0, 0), 8)
     steel = fm.Material("steel", E=E_STEEL, nu=0.3, rho=7850.0)
-    ends = [fm.line_interface(mesh, n, fm.NodeSet(at)) for n, at in (("foot", "start"), ("tip", "end"))]
-    section = fm.BeamProperty(fm.Rectangle(width, width), steel)
+    ends = [
+        fm.beams.line_interface(mesh, n, fm.selections.NodeSet(at)) for n, at in (("foot", "start"), ("tip", "end"))
+    ]
+    section = fm.beams.BeamProperty(fm.beams.Rectangle(width, width), steel)
     body = fm.beam_body(mesh, section, name="b", units=cms.unit_system("m-kg-s"), interfaces=ends)
     force = np.zeros(len(body.dofs))
     force[(body.dofs[:, 0] == 4) & (body.dofs[:, 1] == 2)] = CASE
-    body = cms.couple(replace(body, load_cases=(cms.LoadCase("middle", "force", force),)))
-    rows = (cms.Rows("beam force", components=("end A My",)), cms.Rows("interface force"))
+    body = cms.couple(replace(body, load_cases=(fm.loads.LoadCase("middle", "force", force),)))
+    rows = (cms.reduction.Rows("beam force", components=("end A My",)), cms.reduction.Rows("interface force"))
     return cms.reduce(
         body, cms.craig_bampton(body, n_modes), frame=cms.NodalFrame("foot") if frame is None else frame,
-        damping=cms.ModalDamping(0.5, heavy=True), recovery=cms.RecoveryRequest("t", rows), **options,
+        damping=cms.reduction.ModalDamping(0.5, heavy=True), recovery=cms.reduction.RecoveryRequest("t", rows),
+        **options,
     )  # fmt: skip
 
 

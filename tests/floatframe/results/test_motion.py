@@ -14,7 +14,7 @@ from floatframe.results.trajectory import read_trajectory
 from tests.floatframe.results.examples import SYSTEM
 
 HINGE = ff.RevoluteJoint("pin", ff.GROUND, ff.Marker("rod", "end_b"), axis=(0.2, 1.0, 0.1))
-SPEED = ff.PlaceSensor("bob speed", ff.Marker("bob"), "velocity")
+SPEED = ff.sensors.PlaceSensor("bob speed", ff.Marker("bob"), "velocity")
 SENSED = replace(SYSTEM, joints=(HINGE, *SYSTEM.joints[1:]), sensors=(SPEED,))
 
 
@@ -24,7 +24,7 @@ def motion():
 
 
 def test_joint_coordinates_are_attributes_of_the_joint(motion):
-    pin, known = motion.joint("pin"), ff.joint_coordinates(SENSED, motion)
+    pin, known = motion.joint("pin"), ff.results.joint_coordinates(SENSED, motion)
     for name in pin.coordinates:
         expected = known[f"pin.{name}"]
         assert_array_equal(getattr(pin, name), expected.value)
@@ -40,7 +40,9 @@ def test_bodies_have_their_motion_and_the_places_on_them(motion):
     rod = motion.body("rod")
     assert_array_equal(rod.v, motion_of(motion, None).source.read("u")[:, motion.entry("rod")[1].u0 :][:, :3])
     name = rod.reduced.interfaces[0].name
-    assert_array_equal(rod.interface(name).position, ff.interface_motion(motion, "rod", rod.reduced, name).position)
+    assert_array_equal(
+        rod.interface(name).position, ff.results.interface_motion(motion, "rod", rod.reduced, name).position
+    )
     assert rod.displacement(-1).shape == (len(rod.reduced.nodes), 3)
     with pytest.raises(ResultsError, match="'bob': it is rigid"):
         motion.body("bob").interface("end")
@@ -74,7 +76,7 @@ def test_tables_have_the_names_times_and_units_of_the_measurements(motion):
         (lambda m: m.joint("pins"), ResultsError, "no joint 'pins'; did you mean 'pin'"),
         (lambda m: m.joint("pin").angel, AttributeError, "its coordinates are angle"),
         (lambda m: m.joint("pin").coordinate("angel"), ResultsError, "did you mean 'angle'"),
-        (lambda m: m.sensor("bob sped"), ff.ModelError, "did you mean 'bob speed'"),
+        (lambda m: m.sensor("bob sped"), ff.errors.ModelError, "did you mean 'bob speed'"),
         (lambda m: m.sensor("bob speed").w, AttributeError, "columns: x, y, z, size"),
         (lambda m: m.sensor("bob speed")["w"], ResultsError, "no column 'w'"),
     ],

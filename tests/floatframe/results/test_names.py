@@ -80,9 +80,10 @@ def test_a_linear_system_takes_names(system):
     tip = next(sensor for sensor in system.sensors if sensor.name == "tip")
     given = ff.linearize(
         system,
-        inputs=[ff.ForceInput("a", "motor"), ff.ForceInput("b", "push"),
-                ff.Channel("c", ff.Marker("arm"), direction=(0, 0, 1))],
-        outputs=[ff.CoordinateChannel("a", "pin", "angle"), ff.Column(tip, "x"), ff.Column(tip, "z")],
+        inputs=[ff.analyses.ForceInput("a", "motor"), ff.analyses.ForceInput("b", "push"),
+                ff.sensors.Channel("c", ff.Marker("arm"), direction=(0, 0, 1))],
+        outputs=[ff.sensors.CoordinateChannel("a", "pin", "angle"), ff.analyses.Column(tip, "x"),
+                 ff.analyses.Column(tip, "z")],
     )  # fmt: skip
     assert named.inputs == ("motor.torque", "push", "arm:z")
     assert named.outputs == ("pin.angle", "tip x", "height")
@@ -105,9 +106,11 @@ def test_a_force_has_the_same_names_as_input_and_as_output_of_a_controller(syste
 
 def test_a_user_force_and_a_coupler_take_the_name_of_a_coordinate(system):
     brake = next(force for force in system.forces if getattr(force, "name", "") == "brake")
-    assert brake.coordinates == {"phi": ff.JointCoordinate("pin", "angle")}
+    assert brake.coordinates == {"phi": ff.joints.JointCoordinate("pin", "angle")}
     assert ff.UserForce("u", {"phi": "pin angle"}, forces={"phi": "-phi"}).coordinates == brake.coordinates
-    assert ff.CoordinateCoupler("c", [("pin.angle", 2.0)]).terms == ((ff.JointCoordinate("pin", "angle"), 2.0),)
+    assert ff.joints.CoordinateCoupler("c", [("pin.angle", 2.0)]).terms == (
+        (ff.joints.JointCoordinate("pin", "angle"), 2.0),
+    )
 
 
 def test_measurements_gradients_events_and_outputs_read_a_column_by_dot_and_blank(system):
@@ -119,7 +122,7 @@ def test_measurements_gradients_events_and_outputs_read_a_column_by_dot_and_blan
         assert a.units == b.units
     assert_allclose(motion.sensor("height").value, motion.sensor("tip").z, rtol=0, atol=0)
     for watch in ("tip.z", "tip z"):
-        event = ff.Event("falls", watch=watch, level=-1e-4, direction="falling", stop=True)
+        event = ff.simulation.Event("falls", watch=watch, level=-1e-4, direction="falling", stop=True)
         cut = ff.integrate(replace(system, events=[event]), ff.GeneralizedAlpha(), 0.1, 1e-3)
         assert cut.t[-1] < 0.1
         assert_allclose(cut.sensor("tip").z[-1], -1e-4, rtol=1e-6)
@@ -137,7 +140,7 @@ MISTAKES = {
 @pytest.mark.parametrize("what", MISTAKES)
 def test_an_unknown_name_is_told_with_the_nearest(system, what):
     call, words = MISTAKES[what]
-    with pytest.raises(ff.ModelError, match=words):
+    with pytest.raises(ff.errors.ModelError, match=words):
         call(system)
 
 
@@ -155,13 +158,13 @@ def test_names_in_files(tmp_path, old, new, words):
         (height,) = read_system(tmp_path / "arm.toml")[0].outputs
         assert (height.joint, height.coordinate) == ("pin", "angle")
         return
-    with pytest.raises(ff.SystemFileError, match=words):
+    with pytest.raises(ff.errors.SystemFileError, match=words):
         read_system(tmp_path / "arm.toml")
 
 
 def test_a_study_and_a_gradient_take_both_forms(tmp_path):
     (tmp_path / "arm.toml").write_text(ARM)
-    found = ff.sensitivities(tmp_path / "arm.toml", ["tip.z", "tip z", "pin.angle"], ["bodies.arm.mass"])
+    found = ff.design.sensitivities(tmp_path / "arm.toml", ["tip.z", "tip z", "pin.angle"], ["bodies.arm.mass"])
     assert_array_equal(found.gradient[0], found.gradient[1])
     assert_array_equal(found.values[0], found.values[1])
     assert np.isfinite(found.gradient).all()

@@ -14,13 +14,13 @@ from floatframe import (
     GeneralizedAlpha,
     Gravity,
     Marker,
-    ResultsError,
     RevoluteJoint,
     RigidBody,
     SphericalJoint,
     System,
     integrate,
 )
+from floatframe.errors import ResultsError
 from floatframe.model.rotations import rotation_matrix
 from floatframe.results.export import export_vtk, motion_table
 from floatframe.results.place_motion import (

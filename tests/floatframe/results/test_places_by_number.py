@@ -25,13 +25,13 @@ from floatframe import (
     GeneralizedAlpha,
     Gravity,
     Marker,
-    ModelError,
     RevoluteJoint,
     System,
     integrate,
     read_results,
 )
 from floatframe.cli.app import app
+from floatframe.errors import ModelError
 from floatframe.pictures.animation import motion_scene
 from floatframe.pictures.body_colors import VON_MISES
 from floatframe.pictures.film_times import film_times
@@ -128,7 +128,7 @@ def test_an_element_and_a_set_are_the_mean_of_their_kept_nodes(bars, motions):
     assert_allclose(right["z"], np.mean(single, axis=0), rtol=0, atol=1e-14)
     row = int(np.argmax(mesh.nodes[mesh.cells["hexahedron20"]][:, :, 0].mean(axis=1)))  # the cell at the end
     element = int(mesh.cell_numbers["hexahedron20"][row])
-    found = cms.Address(element=element).find(bars[0], "test")
+    found = cms.body.Address(element=element).find(bars[0], "test")
     assert set(found.names) == {str(mesh.node_numbers[node]) for node in mesh.cells["hexahedron20"][row]}
 
 
@@ -183,7 +183,7 @@ def test_a_sensor_at_a_node_of_a_line_is_an_interface_there():
 def test_elongation_between_numbers_is_that_between_places(motions):
     mesh = renumbered(PLAIN, 1)
     ends = [(0.5, 0.0, 0.04), (1.0, 0.0, 0.04)]
-    numbers = [cms.Address(node=int(mesh.node_numbers[at(place, mesh)])) for place in ends]
+    numbers = [cms.body.Address(node=int(mesh.node_numbers[at(place, mesh)])) for place in ends]
     found = ElongationSensor("e", "bar", *numbers).measure(*motions[0]).columns["strain"]
     assert_allclose(
         found, ElongationSensor("e", "bar", *ends).measure(*motions[1]).columns["strain"], rtol=0, atol=1e-10

@@ -15,14 +15,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from fe_models.foundation.hdf5_file import Manifest, as_attribute, write_sealed_file
-from floatframe import (
-    ConvergenceError,
-    GeneralizedAlpha,
-    ModelError,
-    ResultsError,
-    integrate,
-    read_results,
-)
+from floatframe import GeneralizedAlpha, integrate, read_results
+from floatframe.errors import ConvergenceError, ModelError, ResultsError
 from floatframe.results.place_motion import point_motion
 from floatframe.results.recovery import interface_positions, nodal_positions
 from floatframe.results.results_file import KIND

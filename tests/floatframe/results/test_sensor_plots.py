@@ -8,18 +8,8 @@ from matplotlib.figure import Figure
 from numpy.testing import assert_allclose
 
 from fe_models.foundation.units import unit_system
-from floatframe import (
-    GeneralizedAlpha,
-    Gravity,
-    Marker,
-    ModelError,
-    ResultsError,
-    RevoluteJoint,
-    RigidBody,
-    SphericalJoint,
-    System,
-    integrate,
-)
+from floatframe import GeneralizedAlpha, Gravity, Marker, RevoluteJoint, RigidBody, SphericalJoint, System, integrate
+from floatframe.errors import ModelError, ResultsError
 from floatframe.results.sensor_plots import groups_of, plot_measurement, plot_sensors
 from floatframe.results.sensors import PlaceSensor, ReactionSensor, measured, measurement_of
 from floatframe.results.sensors.measurement import Measurement

@@ -17,20 +17,20 @@ from floatframe import (
     GeneralizedAlpha,
     Gravity,
     Marker,
-    ModelError,
     RevoluteJoint,
     RigidBody,
     SphericalJoint,
     SpringDamper,
     System,
     integrate,
-    joint_coordinate,
     read_results,
 )
 from floatframe.cli.app import app
+from floatframe.errors import ModelError
 from floatframe.files.system_file.read_system import read_system
 from floatframe.model.rotations import rotation_matrix
 from floatframe.pictures.body_colors import VON_MISES
+from floatframe.results import joint_coordinate
 from floatframe.results.place_motion import interface_motion, largest_von_mises, point_motion
 from floatframe.results.sensors import (
     AngleSensor,

@@ -10,10 +10,12 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import floatframe.simulation.integrate as integration
-from floatframe import GeneralizedAlpha, ResultsError, integrate, read_results, resume
+from floatframe import GeneralizedAlpha, integrate, read_results
 from floatframe.analyses.driven.kinematics import kinematics
 from floatframe.components.mechanisms import slider_crank
+from floatframe.errors import ResultsError
 from floatframe.model.functions.time_functions import cycloidal_spin_up
+from floatframe.simulation import resume
 from tests.floatframe.results.examples import SYSTEM
 from tests.root import ROOT
 

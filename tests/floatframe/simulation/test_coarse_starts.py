@@ -57,9 +57,9 @@ def rods():
     R = np.stack([ALONG, np.cross(AXIS, ALONG), AXIS], axis=1)
     made = {}
     for name, (frame, stiffening) in FRAMES.items():
-        body = cms.beam_from_assumed_modes(
+        body = cms.reduction.beam_from_assumed_modes(
             line, name="rod", units=unit_system("m-kg-s"), n_axial=1, n_bending=3, frame=frame,
-            damping=cms.ModalDamping(0.02),
+            damping=cms.reduction.ModalDamping(0.02),
         )  # fmt: skip
         made[name] = FlexibleBody("rod", body, stiffening=stiffening, position=PLACE, orientation=euler_parameters(R))
     return made
@@ -85,7 +85,7 @@ def system(rod, case, h=0.0):
 
 
 def angles(made, motion):
-    return ff.joint_coordinate(made, motion, "hinge", "angle").value
+    return ff.results.joint_coordinate(made, motion, "hinge", "angle").value
 
 
 def run(made, rho, h, formulation, end=END, start=0.0, state=None):
@@ -112,7 +112,7 @@ def stick():
 def errors(made, exact, h, rhos, refused=frozenset()):
     """Return the error of the angle at the end by formulation and rho_inf, of those that are not refused in words."""
     for formulation, rho in refused:
-        with pytest.raises(ff.ConvergenceError, match=r"h = 0\.022 follows 0 of 8 modes"):
+        with pytest.raises(ff.errors.ConvergenceError, match=r"h = 0\.022 follows 0 of 8 modes"):
             run(made, rho, h, formulation)
     return {
         (formulation, rho): abs(angles(made, run(made, rho, h, formulation))[-1] / exact - 1)
@@ -199,7 +199,7 @@ def print_table():
                 for formulation in FORMULATIONS:
                     try:
                         found.append(abs(angles(own, run(own, rho, h, formulation))[-1] / exact - 1))
-                    except ff.ConvergenceError:
+                    except ff.errors.ConvergenceError:
                         star = " *"
             cells.append(f"{100 * max(found):.2f} %{star}")
         print(f"| {rho:g} | {' | '.join(cells)} |", flush=True)

@@ -13,27 +13,25 @@ import cms
 import fe_models as fm
 from floatframe import (
     Controller,
-    Event,
     FlexibleBody,
     GeneralizedAlpha,
     Gravity,
     Marker,
-    ModelError,
     PointForce,
-    ResultsError,
     RevoluteJoint,
     RigidBody,
     System,
     integrate,
     read_results,
-    resume,
 )
+from floatframe.errors import ModelError, ResultsError
 from floatframe.files.cosimulation.held_inputs import with_held_inputs
 from floatframe.integrators import Ida, RelativeOde
 from floatframe.model.bodies.coordinates import JointCoordinate
 from floatframe.model.forces import WITH_AMPLITUDE, BodyLoad, JointForce, UserForce
 from floatframe.model.functions.time_functions import constant, piecewise
 from floatframe.results.sensors import PlaceSensor
+from floatframe.simulation import Event, resume
 from tests.floatframe.simulation.examples import steps_on_record
 
 AXIS = np.array([0.48, -0.6, 0.64])  #: of the hinge, a unit vector
@@ -193,12 +191,12 @@ def test_a_controller_whose_output_stays_changes_nothing_beside_one_whose_output
 
 def flexible_rotor(**parts):
     """A soft arm on the hinge under two body loads; its file has the axes of its foot, the engine takes mean axes."""
-    line = fm.straight_line((0, 0, 0), (0.6, 0.3, -0.2), 3)
-    ends = [fm.line_interface(line, name, fm.NodeSet(name)) for name in ("start", "end")]
-    section = fm.BeamProperty(fm.Rectangle(0.02, 0.03), fm.Material("soft", E=2e9, nu=0.3, rho=7850.0))
+    line = fm.beams.straight_line((0, 0, 0), (0.6, 0.3, -0.2), 3)
+    ends = [fm.beams.line_interface(line, name, fm.selections.NodeSet(name)) for name in ("start", "end")]
+    section = fm.beams.BeamProperty(fm.beams.Rectangle(0.02, 0.03), fm.Material("soft", E=2e9, nu=0.3, rho=7850.0))
     full = cms.couple(fm.beam_body(line, section, name="arm", units="m-kg-s", interfaces=ends))
     full = full.with_load_cases(
-        fm.gravity_load(full, "down", (0.0, 0.0, -9.81)), fm.gravity_load(full, "side", (2.0, 5.0, 0.0))
+        fm.loads.gravity_load(full, "down", (0.0, 0.0, -9.81)), fm.loads.gravity_load(full, "side", (2.0, 5.0, 0.0))
     )
     arm = FlexibleBody("hub", cms.reduce(full, cms.craig_bampton(full, 2), frame=cms.NodalFrame("start")))
     pin = RevoluteJoint("pin", Marker("ground"), Marker("hub", "start"), axis=AXIS)

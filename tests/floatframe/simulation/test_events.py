@@ -10,28 +10,24 @@ import floatframe.simulation.event_steps as event_steps
 import floatframe.simulation.integrate as integration
 from floatframe import (
     GROUND,
-    Bushing,
-    CoordinateCoupler,
-    EnergyMomentum,
-    Event,
     GeneralizedAlpha,
-    JointCoordinate,
     JointForce,
     Marker,
-    ModelError,
     PointForce,
     RevoluteJoint,
     RigidBody,
     SpringDamper,
     System,
-    Variational,
     integrate,
-    joint_coordinate,
-    resume,
-    trapezoidal,
 )
+from floatframe.errors import ModelError
+from floatframe.forces import Bushing
+from floatframe.integrators import EnergyMomentum, Variational, trapezoidal
 from floatframe.integrators.relative_ode import RelativeOde
+from floatframe.joints import CoordinateCoupler, JointCoordinate
+from floatframe.results import joint_coordinate
 from floatframe.results.sensors import PlaceSensor
+from floatframe.simulation import Event, resume
 from floatframe.simulation.event_steps import EventWatch
 from tests.floatframe.simulation.examples import (
     G,

@@ -7,13 +7,11 @@ import pytest
 
 from floatframe import (
     GROUND,
-    AxialDistance,
     GeneralizedAlpha,
     JointForce,
     Marker,
     PointForce,
     PrismaticJoint,
-    RelativeOde,
     RevoluteJoint,
     RigidBody,
     System,
@@ -21,6 +19,8 @@ from floatframe import (
     integrate,
 )
 from floatframe.components import drives
+from floatframe.integrators import RelativeOde
+from floatframe.joints import AxialDistance
 from floatframe.model.functions.time_functions import constant, harmonic, piecewise, polynomial_of_time
 from floatframe.simulation.step_advice import frequency_words
 

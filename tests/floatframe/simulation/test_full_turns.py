@@ -10,37 +10,34 @@ from numpy.testing import assert_allclose, assert_array_equal
 import floatframe.simulation.integrate as integration
 from floatframe import (
     GROUND,
-    AngleSensor,
-    CoordinateCoupler,
-    CylindricalJoint,
-    EnergyMomentum,
-    Event,
     FlexibleBody,
     GeneralizedAlpha,
-    Ida,
-    JointCoordinate,
     JointForce,
     Marker,
-    PlanarJoint,
     PointForce,
-    ResultsError,
     RevoluteJoint,
     RigidBody,
-    ScrewJoint,
     System,
-    UniversalJoint,
     UserForce,
-    Variational,
     integrate,
-    joint_coordinate,
     kinematics,
-    measured,
-    motion_table,
     read_results,
-    resume,
+)
+from floatframe.errors import ResultsError
+from floatframe.integrators import EnergyMomentum, Ida, Variational
+from floatframe.joints import (
+    CoordinateCoupler,
+    CylindricalJoint,
+    JointCoordinate,
+    PlanarJoint,
+    ScrewJoint,
+    UniversalJoint,
 )
 from floatframe.model.functions.time_functions import harmonic, polynomial_of_time
 from floatframe.model.rotations import rotation_matrix
+from floatframe.results import joint_coordinate, motion_table
+from floatframe.sensors import AngleSensor, measured
+from floatframe.simulation import Event, resume
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 
 FAST = 100.0  # rad/s; 100 steps of 1 ms are 1.6 turns

@@ -7,29 +7,26 @@ import pytest
 from numpy.testing import assert_allclose
 
 import cms
+import fe_models
 from fe_models.foundation.units import unit_system
 from floatframe import (
     GROUND,
-    AngleSensor,
-    ControlSensor,
-    EnergyMomentum,
-    Event,
     FlexibleBody,
     GeneralizedAlpha,
-    Ida,
-    JointCoordinate,
     JointForce,
     Marker,
-    PlaceSensor,
     PointForce,
     RevoluteJoint,
     RigidBody,
     System,
     UserForce,
     integrate,
-    measured,
 )
+from floatframe.integrators import EnergyMomentum, Ida
+from floatframe.joints import JointCoordinate
 from floatframe.model.functions.time_functions import constant, piecewise
+from floatframe.sensors import AngleSensor, ControlSensor, PlaceSensor, measured
+from floatframe.simulation import Event
 from floatframe.simulation.jumps import jumps_of_steps
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 
@@ -119,8 +116,8 @@ def test_states_of_user_forces_and_counted_turns_go_on_over_a_jump():
 
 def test_a_jump_inside_a_step_is_as_exact_in_joint_coordinates():
     """A free rod is pushed at its end, the push turns round within a step: fine steps in absolute coordinates tell."""
-    line = cms.BeamLine(1.0, 1.0, 3e5, 300.0, 450.0, 300.0, 1e-3, 1e-3)
-    reduced = cms.beam_from_assumed_modes(
+    line = fe_models.beams.BeamLine(1.0, 1.0, 3e5, 300.0, 450.0, 300.0, 1e-3, 1e-3)
+    reduced = cms.reduction.beam_from_assumed_modes(
         line, name="rod", units=unit_system("m-kg-s"), n_axial=1, n_bending=2, frame=cms.NodalFrame("start")
     )
     rod = FlexibleBody("rod", reduced, stiffening=False, position=(3.0, -40.0, 7.0), omega_B=(-0.2, 0.5, 0.9))

@@ -12,16 +12,11 @@ from scipy.integrate import quad, solve_ivp
 
 from floatframe import (
     GROUND,
-    EnergyMomentum,
     GeneralizedAlpha,
-    Ida,
-    JointCoordinate,
     JointForce,
     Marker,
-    ModelError,
     PointForce,
     PrismaticJoint,
-    RelativeOde,
     RevoluteJoint,
     RigidBody,
     System,
@@ -30,6 +25,9 @@ from floatframe import (
 )
 from floatframe.components import drives
 from floatframe.components.hydraulics import components
+from floatframe.errors import ModelError
+from floatframe.integrators import EnergyMomentum, Ida, RelativeOde
+from floatframe.joints import JointCoordinate
 from floatframe.model.elements import Element, ElementLaw
 from floatframe.model.elements.expressions import ExpressionElement
 from floatframe.model.functions.tables import linear_table

@@ -25,22 +25,24 @@ def swing(method):
 
 def tree(system):
     """Evaluate the equations of a tree."""
-    model = ff.relative_model(system)
+    model = ff.analyses.relative_model(system)
     model.mass_matrix(np.zeros(model.n_z))
 
 
 def sensitivity(system):
     """Differentiate a motion by a mass."""
     name = system.joints[0].name
-    ff.sensitivities(system, [f"{name}.angle value"], [f"bodies.{system.bodies[0].name}.mass"], t_end=0.02, h=0.01)
+    ff.design.sensitivities(
+        system, [f"{name}.angle value"], [f"bodies.{system.bodies[0].name}.mass"], t_end=0.02, h=0.01
+    )
 
 
 CASES = {
     "absolute": swing(ff.GeneralizedAlpha(0.8)),
     "relative": swing(RelativeGeneralizedAlpha(0.8)),
     "ode": swing(RelativeOde()),
-    "energy-momentum": swing(ff.EnergyMomentum()),
-    "variational": swing(ff.Variational()),
+    "energy-momentum": swing(ff.integrators.EnergyMomentum()),
+    "variational": swing(ff.integrators.Variational()),
     "tree": tree,
     "sensitivity": sensitivity,
 }

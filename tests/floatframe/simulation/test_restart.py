@@ -11,19 +11,12 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import floatframe.simulation.integrate as integration
-from floatframe import (
-    GeneralizedAlpha,
-    Gravity,
-    JointForce,
-    ResultsError,
-    System,
-    integrate,
-    read_results,
-    resume,
-)
+from floatframe import GeneralizedAlpha, Gravity, JointForce, System, integrate, read_results
 from floatframe.components.mechanisms import slider_crank
 from floatframe.engine.kernels.entry import prepare
+from floatframe.errors import ResultsError
 from floatframe.model.functions.time_functions import cycloidal_spin_up
+from floatframe.simulation import resume
 from tests.floatframe.simulation.examples import StopHereError, assert_same, steps_on_record, swing
 from tests.root import ROOT
 

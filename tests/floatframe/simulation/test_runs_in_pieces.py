@@ -8,8 +8,9 @@ import floatframe as ff
 
 PLACE = np.array([30.0, -20.0, 10.0])
 METHODS = [
-    (ff.GeneralizedAlpha(0.8), "absolute"), (ff.GeneralizedAlpha(0.8), "relative"), (ff.EnergyMomentum(), None),
-    (ff.EnergyDecaying(0.5), None), (ff.Variational(), None),
+    (ff.GeneralizedAlpha(0.8), "absolute"), (ff.GeneralizedAlpha(0.8), "relative"),
+    (ff.integrators.EnergyMomentum(), None),
+    (ff.integrators.EnergyDecaying(0.5), None), (ff.integrators.Variational(), None),
 ]  # fmt: skip
 
 
@@ -33,7 +34,7 @@ def test_states_of_user_forces_go_on(method, formulation):
     ends = ff.Marker("ground", position=PLACE), ff.Marker("slider", position=np.zeros(3))
     rail = ff.PrismaticJoint("rail", *ends, axis=(1, 0, 0))
     force = ff.UserForce(
-        "lag", {"x": ff.JointCoordinate("rail", "distance")}, {"x": "F*e"}, {"e": "(1 - e)/tau"}, {"e": 0.0},
+        "lag", {"x": ff.joints.JointCoordinate("rail", "distance")}, {"x": "F*e"}, {"e": "(1 - e)/tau"}, {"e": 0.0},
         {"F": F, "tau": tau},
     )  # fmt: skip
     motion = in_pieces(ff.System([slider], [rail], [force]), method, formulation, t_end, 0.02, 7)
@@ -51,9 +52,11 @@ def test_turns_go_on(method, formulation, kind):
     hinge = ff.RevoluteJoint("hinge", *ends, axis=(0, 0, 1))
     k = J * omega**2
     if kind == "bushing":
-        spring = ff.Bushing("spring", *ends, np.diag([0, 0, 0, 0, 0, k]))
+        spring = ff.forces.Bushing("spring", *ends, np.diag([0, 0, 0, 0, 0, k]))
     else:
-        spring = ff.UserForce("spring", {"x": ff.JointCoordinate("hinge", "angle")}, {"x": "-k*x"}, parameters={"k": k})
+        spring = ff.UserForce(
+            "spring", {"x": ff.joints.JointCoordinate("hinge", "angle")}, {"x": "-k*x"}, parameters={"k": k}
+        )
     t_end = 1.2
     motion = in_pieces(ff.System([wheel], [hinge], [spring]), method, formulation, t_end, h, 30)
     exact = omega_0 * np.cos(omega * t_end)

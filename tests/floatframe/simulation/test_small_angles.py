@@ -5,8 +5,9 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from floatframe import Bushing, GeneralizedAlpha, Marker, RigidBody, System, integrate
+from floatframe import GeneralizedAlpha, Marker, RigidBody, System, integrate
 from floatframe.components.bearings import Bearing
+from floatframe.forces import Bushing
 
 PLACE = np.array([40.0, -3.0, 7.0])
 TRIAD = Rotation.from_rotvec([0.4, -0.7, 0.2]).as_matrix()

@@ -16,7 +16,8 @@ MASS, ARM, G = 1.0, 0.3, 9.81
 H, N_STEPS = 0.01, 100
 METHODS = [
     (ff.GeneralizedAlpha(0.8), "absolute"), (ff.GeneralizedAlpha(0.8), "relative"),
-    (ff.GeneralizedAlpha(1.0), "absolute"), (ff.EnergyMomentum(), None), (ff.EnergyDecaying(0.5), None),
+    (ff.GeneralizedAlpha(1.0), "absolute"), (ff.integrators.EnergyMomentum(), None),
+    (ff.integrators.EnergyDecaying(0.5), None),
 ]  # fmt: skip
 
 
@@ -61,7 +62,7 @@ def test_an_asymmetric_body_that_spins_is_right_or_told(method, formulation, arm
     system = ff.System([body], [ball] if arm else [], [ff.Gravity((0, 0, -G))] if arm else [])
     try:
         motion = ff.integrate(system, method, N_STEPS * H, H, formulation=formulation)
-    except ff.ConvergenceError:
+    except ff.errors.ConvergenceError:
         assert turn >= 1.0
         return
     exact = exact_axes(tuple(omega.tolist()), arm)

@@ -11,19 +11,15 @@ from scipy.integrate import solve_ivp
 from typer.testing import CliRunner
 
 import cms
+import fe_models
 import floatframe.simulation.integrate as integration
 from fe_models.foundation.units import unit_system
 from floatframe import (
-    Bushing,
-    ConvergenceError,
-    EnergyMomentum,
-    Event,
     FlexibleBody,
     GeneralizedAlpha,
     Gravity,
     JointForce,
     Marker,
-    ModelError,
     PointForce,
     PrismaticJoint,
     RevoluteJoint,
@@ -33,13 +29,14 @@ from floatframe import (
     System,
     integrate,
     read_results,
-    resume,
-    trapezoidal,
 )
 from floatframe.cli.app import app
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.kernels.memory import KINETIC, WORK_TAKEN, new_rows
 from floatframe.engine.kernels.work import new_work
+from floatframe.errors import ConvergenceError, ModelError
+from floatframe.forces import Bushing
+from floatframe.integrators import EnergyMomentum, trapezoidal
 from floatframe.model.functions.time_functions import constant, harmonic, piecewise
 from floatframe.model.rotations import (
     euler_parameters,
@@ -48,6 +45,7 @@ from floatframe.model.rotations import (
     rotations_between,
 )
 from floatframe.results.validity import ValidityNote, notes_from_json, notes_to_json
+from floatframe.simulation import Event, resume
 from floatframe.simulation.energy_watch import STOP_LIMIT, EnergyWatch
 from floatframe.simulation.step_watch import (
     DOUBLES,
@@ -746,10 +744,10 @@ def test_vibrations_that_no_step_resolves_count_where_half_steps_change_little(t
 
 def test_double_steps_do_not_judge_a_flexible_body_that_turns_by_more_than_a_radian_in_a_step():
     """A free beam that turns by 2.2 rad in a step, as in the motion 81953 of the campaign, against fine steps."""
-    line = cms.BeamLine(1.0, 1.0, 6.28e4, 62.8, 94.2, 62.8, 1e-3, 1e-3)
-    beam = cms.beam_from_assumed_modes(
+    line = fe_models.beams.BeamLine(1.0, 1.0, 6.28e4, 62.8, 94.2, 62.8, 1e-3, 1e-3)
+    beam = cms.reduction.beam_from_assumed_modes(
         line, name="beam", units=unit_system("m-kg-s"), n_axial=1, n_bending=2, n_torsion=1,
-        damping=cms.ModalDamping(0.02),
+        damping=cms.reduction.ModalDamping(0.02),
     )  # fmt: skip
     h = 0.03276788
     body = FlexibleBody(

@@ -7,28 +7,25 @@ from numpy.testing import assert_allclose, assert_array_equal
 import floatframe.simulation.integrate as integration
 from floatframe import (
     GROUND,
-    CoordinateCoupler,
-    Event,
     FlexibleBody,
     GeneralizedAlpha,
     Gravity,
-    JointCoordinate,
     JointForce,
-    Limits,
     Marker,
-    ModelError,
     PointForce,
     PrismaticJoint,
     RevoluteJoint,
     RigidBody,
     System,
     integrate,
-    resume,
     static_equilibrium,
 )
+from floatframe.errors import ModelError
+from floatframe.joints import CoordinateCoupler, JointCoordinate, Limits
 from floatframe.model.functions.time_functions import polynomial_of_time
 from floatframe.results.coordinate_elements import coupler_motion
 from floatframe.results.energy_balance import balance_defect
+from floatframe.simulation import Event, resume
 from tests.floatframe.finite_differences import assert_tangent_is_exact
 from tests.floatframe.model.joints.examples import coupled_pairs, three_bodies
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness

@@ -10,25 +10,22 @@ from numpy.testing import assert_allclose
 from fe_models.foundation.units import unit_system
 from floatframe import (
     GROUND,
-    ConvergenceError,
-    EnergyMomentum,
     GeneralizedAlpha,
-    Ida,
-    JointCoordinate,
     Marker,
-    ModelError,
     PrismaticJoint,
-    RelativeOde,
     RigidBody,
     System,
     UserForce,
     integrate,
-    resume,
-    sensitivities,
     static_equilibrium,
 )
+from floatframe.design import sensitivities
+from floatframe.errors import ConvergenceError, ModelError
 from floatframe.files.cosimulation.unit import Unit
+from floatframe.integrators import EnergyMomentum, Ida, RelativeOde
+from floatframe.joints import JointCoordinate
 from floatframe.model.elements import Element, ElementLaw
+from floatframe.simulation import resume
 
 MASS, H, FORCE = 2.0, 0.02, 100.0
 AXIS = np.array([1.0, 2.0, -2.0]) / 3

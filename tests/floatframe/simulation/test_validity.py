@@ -83,13 +83,15 @@ def test_change_of_the_stiffness_is_that_of_all_loads_at_work(stiffening):
 def column(load, n=12):
     """Return a cantilever along x that gravity presses with `load` of its buckling load (Greenhill), stiffened."""
     length, A, inertia = 1.0, 1e-4, 1e-9
-    mesh = fm.straight_line((0, 0, 0), (length, 0, 0), n)
-    root = fm.line_interface(mesh, "root", fm.NodeIndices((0,)))
-    section = fm.BeamProperty(fm.GeneralSection(A=A, Iy=inertia, Iz=inertia, J=2e-9), ALLOY, orientation=(0, 1, 0))
+    mesh = fm.beams.straight_line((0, 0, 0), (length, 0, 0), n)
+    root = fm.beams.line_interface(mesh, "root", fm.beams.NodeIndices((0,)))
+    section = fm.beams.BeamProperty(
+        fm.beams.GeneralSection(A=A, Iy=inertia, Iz=inertia, J=2e-9), ALLOY, orientation=(0, 1, 0)
+    )
     body = cms.couple(fm.beam_body(mesh, section, name="column", units=cms.unit_system("m-kg-s"), interfaces=[root]))
     reduced = cms.reduce(
         body, cms.craig_bampton(body, n_modes=6), frame=cms.NodalFrame("root"), geometric=True,
-        damping=cms.RayleighDamping(0.0, 0.0),
+        damping=cms.reduction.RayleighDamping(0.0, 0.0),
     )  # fmt: skip
     critical = 7.837347 * ALLOY.E * inertia / (ALLOY.rho * A * length**3)  # Greenhill: of a column under its weight
     return System(
@@ -120,9 +122,9 @@ def rows_at_rest(system):
 
 
 def soft_beam(frame=None):
-    mesh = fm.straight_line((0, 0, 0), (2.0, 0, 0), 10)
-    ends = [fm.line_interface(mesh, name, fm.NodeIndices((k,))) for name, k in (("root", 0), ("tip", 10))]
-    section = fm.BeamProperty(fm.Rectangle(0.02, 0.02), ALLOY, orientation=(0, 1, 0))
+    mesh = fm.beams.straight_line((0, 0, 0), (2.0, 0, 0), 10)
+    ends = [fm.beams.line_interface(mesh, name, fm.beams.NodeIndices((k,))) for name, k in (("root", 0), ("tip", 10))]
+    section = fm.beams.BeamProperty(fm.beams.Rectangle(0.02, 0.02), ALLOY, orientation=(0, 1, 0))
     body = cms.couple(fm.beam_body(mesh, section, name="beam", units=cms.unit_system("m-kg-s"), interfaces=ends))
     return cms.reduce(
         body, cms.craig_bampton(body, n_modes=4), frame=frame or cms.NodalFrame("root"), geometric=True
@@ -186,9 +188,9 @@ def test_a_calm_motion_has_no_notes():
 
 
 def test_a_rotor_above_its_critical_speed_is_out_of_a_linear_frame_and_in_a_stiffened_one():
-    mesh = fm.straight_line((0, 0, 0), (1.0, 0, 0), 10)
-    ends = [fm.line_interface(mesh, name, fm.NodeIndices((k,))) for name, k in (("left", 0), ("right", 10))]
-    section = fm.BeamProperty(fm.Circle(0.01), ALLOY, orientation=(0, 1, 0))
+    mesh = fm.beams.straight_line((0, 0, 0), (1.0, 0, 0), 10)
+    ends = [fm.beams.line_interface(mesh, name, fm.beams.NodeIndices((k,))) for name, k in (("left", 0), ("right", 10))]
+    section = fm.beams.BeamProperty(fm.beams.Circle(0.01), ALLOY, orientation=(0, 1, 0))
     body = cms.couple(fm.beam_body(mesh, section, name="shaft", units=cms.unit_system("m-kg-s"), interfaces=ends))
     shaft = cms.reduce(body, cms.craig_bampton(body, n_modes=4), frame=cms.TisserandFrame(), geometric=True)
     for stiffening, kinds in ((True, set()), (False, {"speed"})):
@@ -204,15 +206,15 @@ def test_notes_are_read_as_they_were_written():
 
 def shaft(length, diameter, frame, n=12, *, geometric=None):
     """Return a steel rod of two ends, 'start' and 'end'."""
-    mesh = fm.straight_line((0, 0, 0), (length, 0, 0), n)
-    ends = [fm.line_interface(mesh, name, fm.NodeIndices((k,))) for name, k in (("start", 0), ("end", n))]
+    mesh = fm.beams.straight_line((0, 0, 0), (length, 0, 0), n)
+    ends = [fm.beams.line_interface(mesh, name, fm.beams.NodeIndices((k,))) for name, k in (("start", 0), ("end", n))]
     steel = fm.Material("steel", E=2e11, nu=0.3, rho=7870.0)
-    section = fm.BeamProperty(fm.Circle(diameter / 2), steel, orientation=(0, 1, 0))
+    section = fm.beams.BeamProperty(fm.beams.Circle(diameter / 2), steel, orientation=(0, 1, 0))
     body = cms.couple(fm.beam_body(mesh, section, name="rod", units=cms.unit_system("m-kg-s"), interfaces=ends))
     return cms.reduce(body, cms.craig_bampton(body, n_modes=8), frame=frame, geometric=geometric)
 
 
-FRAMES = (cms.TisserandFrame(), cms.NodalFrame("start"), cms.BuckensFrame())
+FRAMES = (cms.TisserandFrame(), cms.NodalFrame("start"), cms.reduction.BuckensFrame())
 
 
 @pytest.mark.parametrize("frame", FRAMES, ids=["mean", "root", "Buckens"])

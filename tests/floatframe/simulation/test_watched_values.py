@@ -8,9 +8,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from floatframe import (
     GROUND,
-    ConvergenceError,
-    EnergyMomentum,
-    Event,
     FlexibleBody,
     GeneralizedAlpha,
     JointForce,
@@ -18,18 +15,20 @@ from floatframe import (
     RevoluteJoint,
     RigidBody,
     System,
-    Variational,
     integrate,
-    joint_coordinate,
 )
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.kernels.compiler.structure import n_words, table_of_numbers
 from floatframe.engine.kernels.entry import Order
 from floatframe.engine.kernels.records import filled, zeros
 from floatframe.engine.kernels.work import new_work
+from floatframe.errors import ConvergenceError
+from floatframe.integrators import EnergyMomentum, Variational
 from floatframe.integrators.integrator import memory_of_past
 from floatframe.integrators.relative import RelativeGeneralizedAlpha
+from floatframe.results import joint_coordinate
 from floatframe.results.sensors import CoordinateSensor
+from floatframe.simulation import Event
 from floatframe.simulation.passage import direct_values
 from floatframe.simulation.restart import restart_record
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import cms
+import fe_models
 import floatframe as ff
 from fe_models.foundation.units import unit_system
 from floatframe import GeneralizedAlpha, JointForce, Marker, PointForce, RigidBody, System
@@ -46,7 +47,7 @@ def turning_arm(method, h, formulation="absolute"):
 
 def point_pendulum(method, h):
     """Return the largest speed of a pendulum let go from the level: sqrt(2 g l)."""
-    system = System([body(position=(1, 0, 0))], [ff.DistanceJoint("rod", at("ground"), at("b"))],
+    system = System([body(position=(1, 0, 0))], [ff.joints.DistanceJoint("rod", at("ground"), at("b"))],
                     [ff.Gravity((0, -9.81, 0))])  # fmt: skip
     motion = ff.integrate(system, method, 6.0, h)
     return motion, speed(motion).max(), np.sqrt(2 * 9.81)
@@ -64,7 +65,8 @@ def stiff_slide(h, rho, formulation, *, switched):
     if switched:
         load = PointForce("f", at("b"), force=(0, 0, 1e-9))
         events = [
-            ff.Event(f"e{k}", at=(k + 1) * 10 * h, **{("switch_off", "switch_on")[k % 2]: ("f",)}) for k in range(4)
+            ff.simulation.Event(f"e{k}", at=(k + 1) * 10 * h, **{("switch_off", "switch_on")[k % 2]: ("f",)})
+            for k in range(4)
         ]
     system = System([arm, end], joints, [ff.Gravity((0, -9.81, 0)), spring, load], events=events)
     motion = ff.integrate(system, GeneralizedAlpha(rho), 0.5, h, formulation=formulation)
@@ -92,7 +94,7 @@ def backlash(h):
 def rebound(gap, h=0.01):
     """Return the speed of a ball after a contact with restitution 0.5, over that before."""
     ball = RigidBody("b", 1.0, 0.004 * np.eye(3), position=(0, 0, 0.1 + gap), velocity=(0, 0, -3))
-    contact = ff.SphereContact("c", at("ground"), at("b"), radius_b=0.1, stiffness=1e6, restitution=0.5)
+    contact = ff.forces.SphereContact("c", at("ground"), at("b"), radius_b=0.1, stiffness=1e6, restitution=0.5)
     motion = ff.integrate(System([ball], [], [contact]), GeneralizedAlpha(0.8), 0.2, h)
     return motion, motion.body("b").v[-1, 2] / 3, 0.5
 
@@ -100,7 +102,7 @@ def rebound(gap, h=0.01):
 def fast_sphere(gap, radius, method):
     """Return the speed of a sphere at 100 m/s after an elastic contact."""
     ball = RigidBody("b", 1.0, 0.004 * np.eye(3), position=(0, 0, gap + 0.1), velocity=(0, 0, -100))
-    contact = ff.SphereContact("c", at("ground"), at("b"), radius_b=0.05, radius_a=radius, stiffness=1e7)
+    contact = ff.forces.SphereContact("c", at("ground"), at("b"), radius_b=0.05, radius_a=radius, stiffness=1e7)
     motion = ff.integrate(System([ball], [], [contact]), method, 0.1, 0.01)
     return motion, motion.body("b").v[-1, 2], 100.0
 
@@ -112,7 +114,7 @@ def pulse(kind, h, method=None):
     """Return the speed after a pulse of 0.3 N s, less what a motor that follows it takes back."""
     expected = 0.3 if kind == "user force" else 0.27553
     if kind == "user force":
-        x = {"x": ff.JointCoordinate("slide", "distance")}
+        x = {"x": ff.joints.JointCoordinate("slide", "distance")}
         system = System([body()], [slide()], [ff.UserForce("u", x, {"x": "f(t)"}, functions={"f": PULSE})])
     elif kind == "motor":
         motor = drives.DcMotor("m", at("ground"), at("b"), resistance=1.0, inductance=1e-4, constant=1.0, voltage=PULSE)
@@ -127,9 +129,11 @@ def pulse(kind, h, method=None):
 
 
 def rod(frame):
-    line = cms.BeamLine(1.0, 0.785, 2.1e7, 175.0, 175.0, 112.0, 6.3e-6, 6.3e-6)
-    return cms.beam_from_assumed_modes(line, name="b", units=unit_system("m-kg-s"), n_axial=2, n_bending=4, frame=frame,
-                                       damping=cms.ModalDamping(0.02))  # fmt: skip
+    line = fe_models.beams.BeamLine(1.0, 0.785, 2.1e7, 175.0, 175.0, 112.0, 6.3e-6, 6.3e-6)
+    return cms.reduction.beam_from_assumed_modes(
+        line, name="b", units=unit_system("m-kg-s"), n_axial=2, n_bending=4, frame=frame,
+        damping=cms.reduction.ModalDamping(0.02),
+    )  # fmt: skip
 
 
 def falling_rod(frame, damper, h, rho, formulation):
@@ -143,7 +147,7 @@ def falling_rod(frame, damper, h, rho, formulation):
     rate, J = 0.785 * 9.81 / 2, 0.785 / 3  # torque and inertia about the hinge
     t, c = motion.t[-1], damper / J
     exact = rate / J * t**2 / 2 if not damper else rate / damper * (t - (1 - np.exp(-c * t)) / c)
-    return motion, -ff.joint_coordinate(system, motion, "hinge", "angle").value[-1], exact
+    return motion, -ff.results.joint_coordinate(system, motion, "hinge", "angle").value[-1], exact
 
 
 def motor_in_hinge(method, turn):
@@ -163,7 +167,7 @@ def gyroscope(w, h, formulation="absolute", rho=0.8):
     rotor = RigidBody("b", m, np.diag([J, 0.012, 0.012]), position=(length, 0, 0), velocity=(0, turn * length, 0),
                       omega_B=(w, 0, turn))  # fmt: skip
     joints = [
-        ff.UniversalJoint("gimbal", at("ground"), at("frame"), axis=(0, 0, 1), axis_b=(0, 1, 0)),
+        ff.joints.UniversalJoint("gimbal", at("ground"), at("frame"), axis=(0, 0, 1), axis_b=(0, 1, 0)),
         ff.RevoluteJoint("hinge", at("frame", length), at("b"), axis=(1, 0, 0)),
     ]
     system = System([frame, rotor], joints, [ff.Gravity((0, 0, -g))])
@@ -208,19 +212,20 @@ def restarts(rho, chunk, formulation):
 def rotor_in_bearing(stiffness, damping):
     """Return the largest way from the middle of a rotor let go 0.1 mm off it in its bearing: it never goes further."""
     rotor = RigidBody("b", 10.0, np.diag([0.1, 0.1, 0.2]), position=(1e-4, 0, 0), omega_B=(0, 0, 300.0))
-    plane = ff.PlanarJoint("plane", at("ground"), at("b"), axis=(0, 0, 1))
+    plane = ff.joints.PlanarJoint("plane", at("ground"), at("b"), axis=(0, 0, 1))
     K, C = np.diag([*stiffness, 0, 0, 0, 0]), np.diag([damping, damping, 0, 0, 0, 0])
-    bearing = ff.Bushing("bearing", at("ground"), at("b"), K, damping=C)
+    bearing = ff.forces.Bushing("bearing", at("ground"), at("b"), K, damping=C)
     motion = ff.integrate(System([rotor], [plane], [bearing]), GeneralizedAlpha(0.8), 0.5, 2e-4)
     return motion, np.linalg.norm(motion.body("b").r, axis=1).max(), 1e-4
 
 
-EM, ED = ff.EnergyMomentum(), ff.EnergyDecaying()
+EM, ED = ff.integrators.EnergyMomentum(), ff.integrators.EnergyDecaying()
 CASES = {
     **{f"arm, rho {rho}, h {h}": (lambda rho=rho, h=h: turning_arm(GeneralizedAlpha(rho), h))
        for rho in (1.0, 0.8, 0.5) for h in (5e-3, 2e-2, 5e-2)},
     "arm, relative": lambda: turning_arm(GeneralizedAlpha(0.8), 5e-2, "relative"),
-    **{f"pendulum, trapezoidal, h {h}": (lambda h=h: point_pendulum(ff.trapezoidal(), h)) for h in (5e-3, 2e-2)},
+    **{f"pendulum, trapezoidal, h {h}": (lambda h=h: point_pendulum(ff.integrators.trapezoidal(), h))
+       for h in (5e-3, 2e-2)},
     "pendulum, rho 0.8": lambda: point_pendulum(GeneralizedAlpha(0.8), 2e-2),
     **{f"stiff slide, {formulation}, rho {rho}, h {h}, {'events' if switched else 'jumps'}": (
            lambda a=(h, rho, formulation), s=switched: stiff_slide(*a, switched=s))
@@ -276,7 +281,7 @@ def test_a_motion_that_is_wrong_says_so(name, caplog):
     with caplog.at_level(logging.WARNING):
         try:
             motion, value, exact = CASES[name]()
-        except ff.FloatframeError:
+        except ff.errors.FloatframeError:
             return  # refused in words
     notes = motion if isinstance(motion, tuple) else motion.validity
     told = [note for note in notes if not note.is_of_a_frame] or [

@@ -1,7 +1,7 @@
 """Rows of a recovery table of a body as outputs: element forces, stresses and motions requested at the reduction.
 
-y = D_0 z + D_1 z_dot + D_2 z_ddot + L p (`cms.RecoveryTable`), z = (d, theta, q). The loads p at an interface that is
-the only one of its base are what the base exerts there, W lam, with W from the point of the base to that of the
+y = D_0 z + D_1 z_dot + D_2 z_ddot + L p (`cms.body.RecoveryTable`), z = (d, theta, q). The loads p at an interface that
+is the only one of its base are what the base exerts there, W lam, with W from the point of the base to that of the
 interface; further forces are inputs. Of positions and velocities those are taken off that the first base carries
 rigidly.
 """

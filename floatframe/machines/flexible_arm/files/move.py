@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fe_models import Table
+from fe_models.foundation.documents.table import Table
 from floatframe.machines.flexible_arm import compared, links, moves, plot_motions
 
 if __name__ == "__main__":

@@ -81,7 +81,7 @@ def test_sets_in_the_span_of_the_reference_are_judged_on_a_small_body():
     small = cms.couple(replace(free, interfaces=tuple(replace(x, kind="distributing") for x in free.interfaces)))
     found = compare(small, ["guyan", "craig-bampton-ir", "rubin"], [10, 20], n_reference=40)
     assert [result.verdict for result in found.sets] == ["fail", "fail", "fail"]
-    for name, make in (("craig-bampton-ir", cms.craig_bampton_ir), ("rubin", cms.rubin)):
+    for name, make in (("craig-bampton-ir", cms.modes.craig_bampton_ir), ("rubin", cms.rubin)):
         modes = make(small, n_modes=20)
         own = np.asarray(cms.reduce(small, modes).free_frequencies)
         told = found.set(name).points[-1].record("frequency-error").data["reduced_hz"]
@@ -172,7 +172,7 @@ def test_load_cases_are_judged_as_the_check_of_the_reduced_body_judges_them():
     body = cms.couple(free.with_load_cases(*cases))
     found = compare(body, ["craig-bampton", "guyan"], [3], n_reference=4)
     with Families(body) as families, FullReference(families, band=found.full.band_hz) as reference:
-        for modes in (cms.craig_bampton(families, n_modes=3), cms.guyan(families)):
+        for modes in (cms.craig_bampton(families, n_modes=3), cms.modes.guyan(families)):
             records = check_reduction(body, modes, cms.reduce(body, modes), reference=reference)
             expected = {record.name: record for record in records}["static-load-cases"]
             own = found.set(modes.name).points[0].record("static-load-cases")

@@ -27,4 +27,4 @@ def reduced_bar(*names):
     f[np.flatnonzero((body.nodes[body.dofs[:, 0], 0] == 1.0) & (body.dofs[:, 1] == 2))] = 0.5
     body = cms.couple(with_interfaces(body, *keep).with_load_cases(LoadCase("tip", "force", f)))
     modes = cms.craig_bampton(body, n_modes=3)
-    return cms.reduce(body, modes, damping=cms.RayleighDamping(0.1, 1e-4), geometric=False)
+    return cms.reduce(body, modes, damping=cms.reduction.RayleighDamping(0.1, 1e-4), geometric=False)

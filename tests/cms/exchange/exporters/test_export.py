@@ -58,7 +58,7 @@ def test_two_exports_are_equal_byte_for_byte(to, tmp_path):
     from tests.cms.exchange.exporters.examples import reduced_bar
 
     body = reduced_bar("left") if to not in FLOATING else cloud_body()[0]
-    files = [cms.export_body(body, tmp_path / str(k) / "b.x", to=to, units="m-kg-s") for k in range(2) if not
+    files = [cms.exchange.export_body(body, tmp_path / str(k) / "b.x", to=to, units="m-kg-s") for k in range(2) if not
              (tmp_path / str(k)).mkdir()]  # fmt: skip
     for first, second in zip(*(exported.files for exported in files), strict=True):
         assert first.name == second.name
@@ -66,13 +66,13 @@ def test_two_exports_are_equal_byte_for_byte(to, tmp_path):
 
 
 def test_a_name_without_suffix_gets_that_of_the_format(body, tmp_path):
-    assert cms.export_body(body, tmp_path / "a", to="mbdyn", units="m-kg-s").files == (tmp_path / "a.fem",)
-    assert cms.export_body(body, tmp_path / "a.x", to="mbdyn", units="m-kg-s").files == (tmp_path / "a.x",)
+    assert cms.exchange.export_body(body, tmp_path / "a", to="mbdyn", units="m-kg-s").files == (tmp_path / "a.fem",)
+    assert cms.exchange.export_body(body, tmp_path / "a.x", to="mbdyn", units="m-kg-s").files == (tmp_path / "a.x",)
 
 
 def test_the_header_is_ascii(body, tmp_path):
     told = replace(body, provenance={"solver": "L Lᵀ, 2·10⁻⁶ ≤ größe", "mesh": "rod.msh"})
-    cms.export_body(told, tmp_path / "a.fem", to="mbdyn", units="m-kg-s")
+    cms.exchange.export_body(told, tmp_path / "a.fem", to="mbdyn", units="m-kg-s")
     assert "** solver: L L^T, 2*10-6 <= grosse" in (tmp_path / "a.fem").read_text(encoding="ascii")
 
 
@@ -80,7 +80,7 @@ def test_numbers_are_those_of_the_units_asked_for(body, tmp_path):
     import h5py
 
     for units in ("m-kg-s", "mm-t-s"):
-        cms.export_body(body, tmp_path / f"{units}.h5", to="mbsim", units=units)
+        cms.exchange.export_body(body, tmp_path / f"{units}.h5", to="mbsim", units=units)
     si, mm = (h5py.File(tmp_path / f"{units}.h5") for units in ("m-kg-s", "mm-t-s"))
     with si, mm:
         assert si["mass"][()] == pytest.approx(1000 * mm["mass"][()], rel=1e-14)
@@ -93,7 +93,7 @@ def test_numbers_are_those_of_the_units_asked_for(body, tmp_path):
 def test_the_header_names_the_modal_file_and_its_digest(modal_file, tmp_path):
     from cms.body.modal_file.file import digest
 
-    cms.export_body(modal_file, tmp_path / "b.fem", to="mbdyn", units="m-kg-s")
+    cms.exchange.export_body(modal_file, tmp_path / "b.fem", to="mbdyn", units="m-kg-s")
     text = (tmp_path / "b.fem").read_text(encoding="ascii")
     assert digest(modal_file) in text
     assert "** units m-kg-s: m, kg, s" in text
@@ -184,11 +184,11 @@ def test_a_place_that_cannot_be_written(body, tmp_path):
 
 
 def test_a_device_takes_a_single_file_only(body, tmp_path):
-    cms.export_body(body, "/dev/null", to="mbdyn", units="m-kg-s")
+    cms.exchange.export_body(body, "/dev/null", to="mbdyn", units="m-kg-s")
     with pytest.raises(
         ExportError, match=r"is a device or a pipe, and exudyn is written in files that belong together"
     ):
-        cms.export_body(body, "/dev/null", to="exudyn", units="m-kg-s")
+        cms.exchange.export_body(body, "/dev/null", to="exudyn", units="m-kg-s")
 
 
 def test_files_that_belong_together_appear_together_or_not_at_all(body, tmp_path, monkeypatch):
@@ -222,7 +222,7 @@ def test_turned_axes_of_interfaces_are_said_to_be_lost(to, tmp_path):
 
     def lost(triad):
         each = replace(body, interfaces=[replace(x, triad=triad) for x in body.interfaces])
-        told = cms.export_body(each, tmp_path / "b", to=to, units="m-kg-s").left_out
+        told = cms.exchange.export_body(each, tmp_path / "b", to=to, units="m-kg-s").left_out
         return [words for words in told if words.startswith("axes of the interfaces")]
 
     assert lost(straight) == []

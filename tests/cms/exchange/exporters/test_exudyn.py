@@ -23,7 +23,7 @@ def exported(tmp_path_factory):
     """The bar, its archive, and the script as a module."""
     path = tmp_path_factory.mktemp("exudyn") / "bar.npz"
     reduced = soft_bar()
-    cms.export_body(reduced, path, to="exudyn", units="m-kg-s")
+    cms.exchange.export_body(reduced, path, to="exudyn", units="m-kg-s")
     spec = importlib.util.spec_from_file_location("bar_of_exudyn", path.with_suffix(".py"))
     script = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(script)

@@ -85,7 +85,7 @@ def test_recovery_and_loads_follow_the_nodes(coupled, modes):
 
 
 def test_missing_constraint_modes_are_named(coupled):
-    reduced = cms.reduce(coupled, cms.normal_modes(coupled, n_modes=4), geometric=False)
+    reduced = cms.reduce(coupled, cms.modes.normal_modes(coupled, n_modes=4), geometric=False)
     with pytest.raises(ExportError, match=r"move only 10 of the 12 dofs .* missing constraint modes: .* ux, right rx"):
         interface_model(reduced)
 

@@ -30,7 +30,7 @@ def model(reduced):
 
 
 def export(body, tmp_path, name, to, **options):
-    return cms.export_body(body, tmp_path / name, to=to, units="m-kg-s", **options)
+    return cms.exchange.export_body(body, tmp_path / name, to=to, units="m-kg-s", **options)
 
 
 def test_mat_of_version_5(reduced, model, tmp_path):
@@ -191,9 +191,9 @@ WITHOUT_NAMES = {"mat": "bar.mat", "mat73": "bar.mat", "nastran-dmig": "bar.pch"
 
 @pytest.mark.parametrize("to", WITHOUT_NAMES)
 def test_superelements_come_back_with_their_frequencies(to, reduced, tmp_path):
-    """Through `cms.import_body`: its own modes and frame, the same free body; ten digits of DMIG."""
+    """Through `cms.exchange.import_body`: its own modes and frame, the same free body; ten digits of DMIG."""
     exported = export(reduced, tmp_path, WITHOUT_NAMES[to], to)
-    back = cms.import_body(exported.files, units="m-kg-s")
+    back = cms.exchange.import_body(exported.files, units="m-kg-s")
     assert back.n_q == reduced.n_q
     assert_allclose(back.free_frequencies, reduced.free_frequencies, rtol=1e-6 if to == "nastran-dmig" else 1e-8)
     assert_allclose(back.moments.m, reduced.moments.m, rtol=1e-8)

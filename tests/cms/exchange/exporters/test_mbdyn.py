@@ -29,7 +29,7 @@ def written(tmp_path_factory):
     body, cloud = cloud_body()
     body = stiffened(body)
     path = tmp_path_factory.mktemp("mbdyn") / "body.fem"
-    exported = cms.export_body(body, path, to="mbdyn", units=body.units)
+    exported = cms.exchange.export_body(body, path, to="mbdyn", units=body.units)
     return body, cloud, groups_of(path.read_text()), exported
 
 
@@ -102,7 +102,7 @@ def test_stress_stiffening_is_that_of_the_body_for_any_motion(written):
 
 def test_all_nodes_on_request(tmp_path):
     body, cloud = cloud_body()
-    cms.export_body(body, tmp_path / "all.fem", to="mbdyn", units=body.units, nodes="all")
+    cms.exchange.export_body(body, tmp_path / "all.fem", to="mbdyn", units=body.units, nodes="all")
     groups = groups_of((tmp_path / "all.fem").read_text())
     n_nodes = int(groups[1][0][0].split()[1])
     shapes = np.reshape(groups[8][1], (body.n_q, n_nodes, 6))[:, : len(cloud.mass), :3]

@@ -13,7 +13,7 @@ from tests.cms.exchange.exporters.small_bodies import cloud_body
 def written(tmp_path_factory):
     body, cloud = cloud_body()
     path = tmp_path_factory.mktemp("mbsim") / "body.h5"
-    exported = cms.export_body(body, path, to="mbsim", units="m-kg-s")
+    exported = cms.exchange.export_body(body, path, to="mbsim", units="m-kg-s")
     return body, cloud.in_si(body.units), path, exported
 
 
@@ -50,10 +50,10 @@ def test_nodes_move_as_in_the_body_and_faces_end_by_minus_one(written):
     assert_allclose(phi[:n_kept], cloud.phi, rtol=1e-14)
     assert_array_equal(faces[:, :3], body.surface)
     assert (faces[:, 3] == -1).all()
-    interface = cms.convert_units(body, "m-kg-s").interface("big_end")
+    interface = cms.body.convert_units(body, "m-kg-s").interface("big_end")
     assert_allclose(positions[row], interface.position)
     assert_allclose(np.concatenate([phi[row], psi[row]]), interface.Psi)
-    ours = np.asarray(cms.convert_units(body, "m-kg-s").stress)  # xx yy zz yz xz xy
+    ours = np.asarray(cms.body.convert_units(body, "m-kg-s").stress)  # xx yy zz yz xz xy
     assert_allclose(stress[:n_kept, 3], ours[:, 5])  # xy
     assert_allclose(stress[:n_kept, 4], ours[:, 3])  # yz
     assert_allclose(stress[:n_kept, 5], ours[:, 4])  # zx

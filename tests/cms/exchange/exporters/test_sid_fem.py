@@ -52,7 +52,7 @@ def value(term, q):
 def written_terms(dialect, tmp_path, *, geometric=False, n_q=4):
     body, cloud = cloud_body(n_q=n_q)
     body = stiffened(body) if geometric else body
-    cms.export_body(body, tmp_path / "b.SID_FEM", to=dialect, units=body.units)
+    cms.exchange.export_body(body, tmp_path / "b.SID_FEM", to=dialect, units=body.units)
     text = (tmp_path / "b.SID_FEM").read_text()
     return body, cloud, read_sid(text, column_last=DIALECTS[dialect].column_last), text
 

@@ -153,7 +153,7 @@ def by_place(body):
 def test_numbers_go_out_and_come_back(reduced, tmp_path, form, suffix):
     written = export_body(reduced, tmp_path / f"bar{suffix}", to=form, units="m-kg-s", nodes="all")
     assert any("numbers of nodes are those of the mesh" in note for note in written.notes)
-    found = by_place(cms.import_body(written.files[0], units="m-kg-s", form=form))
+    found = by_place(cms.exchange.import_body(written.files[0], units="m-kg-s", form=form))
     ours = by_place(reduced)
     assert list(found) == list(ours) == sorted(NODE.tolist())
     shift = found[int(NODE[0])] - ours[int(NODE[0])]  # files say nothing of the place of B in the mesh
@@ -199,10 +199,14 @@ def test_info_tells_numbers_sets_and_nodes_that_turn(reduced, tmp_path):
 
 def test_abaqus_and_exudyn_files_name_the_nodes_of_the_mesh(tmp_path):
     """Boundary nodes that are nodes of the mesh in the deck, all kept nodes in the archive; a script finds them."""
-    mesh = replace(fm.straight_line((0, 0, 0), (1, 0, 0), 3), node_numbers=1000 + 10 * np.arange(4))
-    ends = [fm.line_interface(mesh, name, fm.NodeIndices((k,))) for name, k in (("root", 0), ("tip", 3))]
+    mesh = replace(fm.beams.straight_line((0, 0, 0), (1, 0, 0), 3), node_numbers=1000 + 10 * np.arange(4))
+    ends = [fm.beams.line_interface(mesh, name, fm.beams.NodeIndices((k,))) for name, k in (("root", 0), ("tip", 3))]
     body = fm.beam_body(
-        mesh, fm.BeamProperty(fm.Circle(0.02), STEEL), name="rod", units=unit_system("m-kg-s"), interfaces=ends
+        mesh,
+        fm.beams.BeamProperty(fm.beams.Circle(0.02), STEEL),
+        name="rod",
+        units=unit_system("m-kg-s"),
+        interfaces=ends,
     )
     body = cms.couple(body)
     reduced = cms.reduce(body, cms.craig_bampton(body, n_modes=2))

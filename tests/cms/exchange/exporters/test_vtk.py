@@ -13,7 +13,7 @@ def test_each_mode_is_a_grid_of_the_collection(tmp_path):
     import pyvista
 
     body, cloud = cloud_body(n_q=2)
-    exported = cms.export_body(body, tmp_path / "b.pvd", to="vtk", units=body.units)
+    exported = cms.exchange.export_body(body, tmp_path / "b.pvd", to="vtk", units=body.units)
     assert [path.name for path in exported.files] == ["b.pvd", "b_1.vtu", "b_2.vtu"]
     entries = ET.parse(tmp_path / "b.pvd").getroot().iter("DataSet")
     assert [entry.get("file") for entry in entries] == ["b_1.vtu", "b_2.vtu"]
@@ -40,10 +40,10 @@ def test_turned_frames_give_fields_in_mesh_axes(tmp_path):
     import pyvista
 
     body, _ = cloud_body(n_q=2)
-    turned = cms.convert_frame(body, cms.TisserandFrame(axes=([0, 1, 0], [0, 0, 1], [1, 0, 0])))
-    plain = cms.convert_frame(body, cms.TisserandFrame())
+    turned = cms.reduction.convert_frame(body, cms.TisserandFrame(axes=([0, 1, 0], [0, 0, 1], [1, 0, 0])))
+    plain = cms.reduction.convert_frame(body, cms.TisserandFrame())
     for name, each in {"a": turned, "b": plain}.items():
-        cms.export_body(each, tmp_path / f"{name}.pvd", to="vtk", units=body.units)
+        cms.exchange.export_body(each, tmp_path / f"{name}.pvd", to="vtk", units=body.units)
     a, b = (pyvista.read(tmp_path / f"{name}_1.vtu") for name in "ab")
     assert_allclose(a.points, b.points, rtol=0, atol=1e-12)
     sign = np.sign(np.sum(a["displacement"] * b["displacement"]))

@@ -43,7 +43,7 @@ def raw_matrices(path):
 
 
 def test_a_superelement_of_nastran_has_the_frequencies_of_its_matrices_as_another_program_reads_them(outboard):
-    body = cms.import_body(outboard, units="mm-kg-s")
+    body = cms.exchange.import_body(outboard, units="mm-kg-s")
     K, M = raw_matrices(outboard)
     # torsion of the bars has no mass: omega² from the pencil (M, K + s M), whose right side is definite
     s = 100.0
@@ -61,7 +61,7 @@ def test_a_superelement_of_nastran_has_the_frequencies_of_its_matrices_as_anothe
 
 def test_its_recovery_moves_every_node_as_the_modes_of_a_beam_do(outboard):
     """Interface nodes are among the recovered ones: both routes say one motion."""
-    body = cms.import_body([outboard.with_name(name) for name in NAMES], units="mm-kg-s")
+    body = cms.exchange.import_body([outboard.with_name(name) for name in NAMES], units="mm-kg-s")
     assert len(body.nodes) == 26
     for interface in body.interfaces:
         row = int(np.flatnonzero(body.node_ids == int(interface.name.split()[1]))[0])
@@ -73,7 +73,7 @@ def test_units_are_asked_for(outboard):
     assert result.exit_code != 0
     assert "--units: missing; none of these formats says its units" in result.output.replace("\n", " ")
     with pytest.raises(UnitsError, match="unknown unit system"):
-        cms.import_body(outboard, units="mm")
+        cms.exchange.import_body(outboard, units="mm")
 
 
 def test_the_command_writes_a_file_that_says_what_is_missing(outboard, tmp_path):
@@ -111,7 +111,7 @@ def test_a_body_of_ours_that_went_out_as_plain_matrices_moves_as_before(tmp_path
     from cms.exchange.importers.superelement_body import ImportOptions, body_of_superelement
     from fe_models.foundation.units import unit_system
 
-    plain = cms.import_body(
+    plain = cms.exchange.import_body(
         {"K": tmp_path / "K.mtx", "M": tmp_path / "M.mtx"}, units="m-kg-s", nodes=places, boundary=boundary
     )
     assert plain.moments.missing == ("3C", "4C", "5C")
@@ -133,7 +133,7 @@ def test_a_body_of_ours_that_went_out_as_plain_matrices_moves_as_before(tmp_path
 def test_what_cannot_be_read_is_one_message(outboard, tmp_path):
     def refused(files, words, error=ForeignBodyError, **more):
         with pytest.raises(error, match=words):
-            cms.import_body(files, **{"units": "mm-kg-s", **more})
+            cms.exchange.import_body(files, **{"units": "mm-kg-s", **more})
 
     refused(tmp_path / "outbord.op4", "there is no such file; did you mean")
     refused(tmp_path, "expected a file, got a folder")
@@ -156,13 +156,13 @@ def test_matrices_without_rows_or_places_ask_for_them(tmp_path):
         write_coordinates(tmp_path / f"{role}.mtx", np.asarray(getattr(element, role)))
     files = {"K": tmp_path / "K.mtx", "M": tmp_path / "M.mtx"}
     with pytest.raises(ForeignBodyError, match="do not say which dof each row is"):
-        cms.import_body(files, units="m-kg-s")
+        cms.exchange.import_body(files, units="m-kg-s")
     with pytest.raises(ForeignBodyError, match="have dofs and no place"):
-        cms.import_body(files, units="m-kg-s", boundary=[1, 2])
+        cms.exchange.import_body(files, units="m-kg-s", boundary=[1, 2])
     with pytest.raises(ForeignBodyError, match="3 nodes have 18 dofs, the matrices 14 rows"):
-        cms.import_body(files, units="m-kg-s", boundary=[1, 2, 3])
+        cms.exchange.import_body(files, units="m-kg-s", boundary=[1, 2, 3])
     with pytest.raises(ForeignBodyError, match="M is missing"):
-        cms.import_body({"K": files["K"]}, units="m-kg-s", boundary=[1, 2])
+        cms.exchange.import_body({"K": files["K"]}, units="m-kg-s", boundary=[1, 2])
 
 
 @pytest.mark.parametrize(
@@ -186,13 +186,13 @@ def test_a_damping_ratio_above_a_fifth_is_taken_if_it_is_confirmed(outboard, tmp
     words = ["import", str(outboard), "--units", "mm-kg-s", "-o", str(tmp_path / "body.h5")]
     result = CliRunner().invoke(app, [*words, "--damping", "0.3", "--heavy"])
     assert result.exit_code == 0, result.output
-    body, bare = cms.read(tmp_path / "body.h5"), cms.import_body(outboard, units="mm-kg-s")
+    body, bare = cms.read(tmp_path / "body.h5"), cms.exchange.import_body(outboard, units="mm-kg-s")
     omega = np.sqrt(np.diag(body.K) * np.diag(body.M))
     assert_allclose(np.diag(body.D - bare.D), 2 * 0.3 * omega, rtol=1e-9, atol=0)
 
 
 def test_a_table_of_nodal_masses_completes_a_superelement(outboard, tmp_path):
-    body = cms.import_body(outboard, units="mm-kg-s")
+    body = cms.exchange.import_body(outboard, units="mm-kg-s")
     share = body.moments.m / len(body.nodes)
     table = tmp_path / "masses.csv"
     table.write_text("node,mass\n" + "".join(f"{number},{share:.12g}\n" for number in body.node_ids))
@@ -211,7 +211,7 @@ def test_a_superelement_of_ansys_has_its_mass_and_the_frequencies_of_its_matrice
     from fe_models.files.matrices.read_matrices import read_matrices
 
     path = ROOT / "tests" / "fe_models" / "files" / "data" / "ansys" / "cp56.sub"
-    body = cms.import_body(path, units="m-kg-s")
+    body = cms.exchange.import_body(path, units="m-kg-s")
     assert_allclose(body.moments.m, 30.0**3 * 7850.0, rtol=1e-9)
     assert_allclose(
         body.moments.J0, body.moments.m * 30.0**2 / 6 * np.eye(3), rtol=0, atol=2e-3 * body.moments.J0[0, 0]
@@ -221,7 +221,7 @@ def test_a_superelement_of_ansys_has_its_mass_and_the_frequencies_of_its_matrice
     omega2 = la.eigh(raw.K.toarray(), raw.M.toarray(), eigvals_only=True)
     assert_allclose(body.free_frequencies[:20], np.sqrt(omega2[6:26]) / (2 * np.pi), rtol=1e-6)
     with pytest.raises(BodyError, match="the mass is"):
-        cms.import_body(path, units="mm-t-s")
+        cms.exchange.import_body(path, units="mm-t-s")
 
 
 def test_a_substructure_of_abaqus_finds_its_places_in_a_deck(tmp_path):
@@ -243,22 +243,22 @@ def test_a_substructure_of_abaqus_finds_its_places_in_a_deck(tmp_path):
     places = {int(n): element.nodes[element.places(np.array([n]))[0]] for n in numbers}
     deck = ["*NODE", *(f"{n}, {', '.join(f'{x:.12g}' for x in place)}" for n, place in places.items())]
     (tmp_path / "part.inp").write_text("\n".join(deck) + "\n")
-    own = cms.reduce(part, cms.guyan(part), geometric=False)
-    body = cms.import_body(
+    own = cms.reduce(part, cms.modes.guyan(part), geometric=False)
+    body = cms.exchange.import_body(
         tmp_path / "part.mtx", units="m-kg-s", nodes=places, interfaces={"a": numbers[:1], "b": numbers[1:]}
     )
     assert_allclose(body.free_frequencies, own.free_frequencies, rtol=1e-8)
-    from_deck = cms.import_body(tmp_path / "part.mtx", units="m-kg-s", nodes=tmp_path / "part.inp")
+    from_deck = cms.exchange.import_body(tmp_path / "part.mtx", units="m-kg-s", nodes=tmp_path / "part.inp")
     assert_allclose(from_deck.free_frequencies, own.free_frequencies, rtol=1e-8)
     with pytest.raises(ForeignBodyError, match="have dofs and no place"):
-        cms.import_body(tmp_path / "part.mtx", units="m-kg-s")
+        cms.exchange.import_body(tmp_path / "part.mtx", units="m-kg-s")
 
 
 def test_a_superelement_that_we_wrote_for_nastran_comes_back(tmp_path):
     part = cms.couple(bar(nx=4, length=0.8, width=0.06, height=0.05))
     own = cms.reduce(part, cms.craig_bampton(part, n_modes=3), geometric=False, stress=False)
     export_body(own, tmp_path / "part.op4", to="nastran-op4", units=own.units)
-    body = cms.import_body(tmp_path / "part.op4", units=own.units)
+    body = cms.exchange.import_body(tmp_path / "part.op4", units=own.units)
     assert_allclose(body.free_frequencies, own.free_frequencies, rtol=1e-8)
     assert_allclose(body.moments.J0, own.moments.J0, rtol=0, atol=1e-8 * np.abs(own.moments.J0).max())
     assert body.moments.missing == ("3C", "4C", "5C")

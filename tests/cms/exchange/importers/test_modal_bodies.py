@@ -25,8 +25,10 @@ FORMATS = {"mbsim": ".h5", "exudyn": ".npz", "mbdyn": ".fem", "sid_fem": ".SID_F
 def mean():
     """A body in mean axes, whose modes other programs can hold as they are."""
     part = cms.couple(bar(nx=4, width=0.07, height=0.04))
-    body = cms.reduce(part, cms.craig_bampton(part, n_modes=2), geometric=False, damping=cms.ModalDamping(0.01))
-    return cms.convert_units(body, "mm-t-s")
+    body = cms.reduce(
+        part, cms.craig_bampton(part, n_modes=2), geometric=False, damping=cms.reduction.ModalDamping(0.01)
+    )
+    return cms.body.convert_units(body, "mm-t-s")
 
 
 def written(body, key, folder):
@@ -43,7 +45,7 @@ def names_of(body, key):
 @pytest.mark.parametrize("key", FORMATS)
 def test_a_body_in_mean_axes_comes_back_as_it_was(mean, key, tmp_path):
     path = written(mean, key, tmp_path)
-    body = cms.import_body(path, units="mm-t-s", interfaces=names_of(mean, key))
+    body = cms.exchange.import_body(path, units="mm-t-s", interfaces=names_of(mean, key))
     assert body.frame.kind == "tisserand"
     assert body.moments.missing == ()
     assert_allclose(np.diag(body.K), np.diag(mean.K), rtol=1e-10)
@@ -70,24 +72,27 @@ def test_a_file_in_other_units_is_told(mean, tmp_path):
     for key in FORMATS:
         path = written(mean, key, tmp_path)
         with pytest.raises(ForeignBodyError, match=r"units m-kg-s: .*; name the units of the file"):
-            cms.import_body(path, units="m-kg-s", interfaces=names_of(mean, key))
-        assert cms.import_body(path, units="m-kg-s", interfaces=names_of(mean, key), accept=["units"]).n_q == mean.n_q
+            cms.exchange.import_body(path, units="m-kg-s", interfaces=names_of(mean, key))
+        assert (
+            cms.exchange.import_body(path, units="m-kg-s", interfaces=names_of(mean, key), accept=["units"]).n_q
+            == mean.n_q
+        )
 
 
 @pytest.mark.parametrize("key", FORMATS)
 def test_a_body_in_another_frame_is_moved_to_mean_axes(key, tmp_path):
     soft = soft_bar(6)
-    body = cms.import_body(
+    body = cms.exchange.import_body(
         written(soft, key, tmp_path), units=soft.units, interfaces=names_of(soft, key), accept=["units"]
     )
-    expected = cms.convert_frame(soft, cms.TisserandFrame())
+    expected = cms.reduction.convert_frame(soft, cms.TisserandFrame())
     assert body.frame.kind == "tisserand"
     assert_allclose(np.diag(body.K), np.diag(expected.K), rtol=1e-8)
     assert_allclose(body.moments.J0, expected.moments.J0, rtol=0, atol=1e-9 * np.abs(expected.moments.J0).max())
     own = np.linalg.norm(expected.interface("right").Psi, axis=0)
     assert_allclose(np.linalg.norm(body.interface("right").Psi, axis=0), own, rtol=1e-7, atol=1e-7 * own.max())
     if key != "exudyn":
-        back = cms.import_body(
+        back = cms.exchange.import_body(
             written(soft, key, tmp_path), units=soft.units, interfaces=names_of(soft, key), frame=cms.NodalFrame("left")
         )
         assert_allclose(np.diag(back.K), np.diag(soft.K), rtol=1e-8)
@@ -120,7 +125,7 @@ def test_any_modes_of_the_same_span_are_the_same_body(seed):
     """Modes that are neither orthonormal nor of one size: all that is linear or quadratic in them is carried along."""
     part = bar(nx=4, width=0.07, height=0.04)
     part = cms.couple(part.with_load_cases(nodal_load(part, "push", {17: np.array([3.0, -5.0, 4.0])})))
-    body = cms.reduce(part, cms.craig_bampton(part, n_modes=2), damping=cms.ModalDamping(0.01))
+    body = cms.reduce(part, cms.craig_bampton(part, n_modes=2), damping=cms.reduction.ModalDamping(0.01))
     rng = np.random.default_rng(seed)
     T = rng.normal(size=(body.n_q, body.n_q)) * 10 ** rng.uniform(-2, 2, size=body.n_q)
     options = ImportOptions(units=body.units)
@@ -144,7 +149,7 @@ def test_any_modes_of_the_same_span_are_the_same_body(seed):
 
 
 def test_stress_and_surface_come_back_from_mbsim(mean, tmp_path):
-    body = cms.import_body(written(mean, "mbsim", tmp_path), units="mm-t-s")
+    body = cms.exchange.import_body(written(mean, "mbsim", tmp_path), units="mm-t-s")
     flip = np.sign(np.einsum("ak,ak->k", body.interface("left").Psi[:3], mean.interface("left").Psi[:3]))
     n = len(mean.nodes)
     assert_allclose(body.stress[:n] * flip, mean.stress, rtol=0, atol=1e-8 * np.abs(mean.stress).max())
@@ -161,7 +166,7 @@ def test_damage_of_mbsim_files_is_told(mean, tmp_path):
     def refused(change, words):
         path = altered_h5(shutil.copy(whole, tmp_path / "bad.h5"), change)
         with pytest.raises(ForeignBodyError, match=words):
-            cms.import_body(path, units="mm-t-s")
+            cms.exchange.import_body(path, units="mm-t-s")
 
     def put(file, name, values):
         del file[name]
@@ -186,13 +191,13 @@ def test_damage_of_mbsim_files_is_told(mean, tmp_path):
     content = whole.read_bytes()
     (tmp_path / "cut.h5").write_bytes(content[: len(content) // 2])
     with pytest.raises((ForeignBodyError, ValueError)):
-        cms.import_body(tmp_path / "cut.h5", units="mm-t-s", form="mbsim")
+        cms.exchange.import_body(tmp_path / "cut.h5", units="mm-t-s", form="mbsim")
 
 
 def test_an_unknown_node_as_an_interface_is_told(mean, tmp_path):
     path = written(mean, "mbdyn", tmp_path)
     with pytest.raises(ForeignBodyError, match=r"expected nodes of the file, which are 1, 2; got \[9\]"):
-        cms.import_body(path, units="mm-t-s", interfaces={"a": [9]})
+        cms.exchange.import_body(path, units="mm-t-s", interfaces={"a": [9]})
 
 
 @pytest.mark.parametrize(
@@ -216,25 +221,25 @@ def test_damage_of_text_files_is_told(mean, tmp_path, key, pattern, to, words):
     assert changed != text
     path.write_text(changed)
     with pytest.raises((ForeignBodyError, BodyError), match=words):
-        cms.import_body(path, units="mm-t-s", form=key)
+        cms.exchange.import_body(path, units="mm-t-s", form=key)
 
 
 def test_the_index_order_of_a_sid_file_is_told_or_asked(mean, tmp_path):
     """Both orders read alike; a file that is taken for the other is refused."""
     first, second = (
-        cms.import_body(written(mean, key, tmp_path), units="mm-t-s") for key in ("sid_fem", "sid_fem-fembeam")
+        cms.exchange.import_body(written(mean, key, tmp_path), units="mm-t-s") for key in ("sid_fem", "sid_fem-fembeam")
     )
     assert "m1(row, q, column)" in first.provenance["note 1"]
     assert "m1(row, column, q)" in second.provenance["note 1"]
     assert_allclose(first.moments.C3, second.moments.C3, rtol=0, atol=1e-12 * np.abs(first.moments.C3).max())
     path = written(mean, "sid_fem", tmp_path)
     with pytest.raises(ForeignBodyError, match=r"index order m1\(row, q, column\), not"):
-        cms.import_body(path, units="mm-t-s", form="sid_fem-fembeam")
+        cms.exchange.import_body(path, units="mm-t-s", form="sid_fem-fembeam")
 
 
 def test_the_other_order_of_the_columns_of_ge_is_told_by_cr(mean, tmp_path):
     path = written(mean, "sid_fem", tmp_path)
-    expected = cms.import_body(path, units="mm-t-s")
+    expected = cms.exchange.import_body(path, units="mm-t-s")
     n, lines, inside = mean.n_q, [], False
     for line in path.read_text().splitlines():
         inside = (inside or line.strip() == "Ge") and line.strip() != "end Ge"
@@ -243,7 +248,7 @@ def test_the_other_order_of_the_columns_of_ge_is_told_by_cr(mean, tmp_path):
             line = line.replace(found[0], f"m0({int(found[1]):2d},{axis * n + k + 1:2d})")
         lines.append(line)
     path.write_text("\n".join(lines) + "\n")
-    body = cms.import_body(path, units="mm-t-s")
+    body = cms.exchange.import_body(path, units="mm-t-s")
     assert any("axis*n+k" in value for value in body.provenance.values())
     assert_allclose(body.moments.C4, expected.moments.C4, rtol=0, atol=1e-12 * np.abs(expected.moments.C4).max())
 
@@ -254,7 +259,7 @@ def test_a_file_without_the_second_order_of_inertia_lacks_5c(mean, tmp_path):
     begin, end = text.index("Gr\n"), text.index("end Gr")
     part = re.sub(r"\n *m1\(.*", "", text[begin:end])
     path.write_text(text[:begin] + re.sub(r"(order +=) +1", r"\1    0", part) + text[end:])
-    body = cms.import_body(path, units="mm-t-s")
+    body = cms.exchange.import_body(path, units="mm-t-s")
     assert body.moments.missing == ("5C",)
     assert_allclose(np.abs(body.moments.C3), np.abs(mean.moments.C3), rtol=0, atol=1e-7 * np.abs(mean.moments.C3).max())
 
@@ -265,11 +270,11 @@ def test_archives_of_exudyn_never_open_pickled_objects(mean, tmp_path):
         arrays = {key: archive[key] for key in archive.files}
     np.savez(tmp_path / "evil.npz", **{**arrays, "xRef": np.array([object()], dtype=object)})
     with pytest.raises(ForeignBodyError, match=r"damaged|numbers"):
-        cms.import_body(tmp_path / "evil.npz", units="mm-t-s")
+        cms.exchange.import_body(tmp_path / "evil.npz", units="mm-t-s")
     del arrays["mPsiTildePsiTilde"]
     np.savez(tmp_path / "short.npz", **arrays)
     with pytest.raises(ForeignBodyError, match="'mPsiTildePsiTilde' is missing"):
-        cms.import_body(tmp_path / "short.npz", units="mm-t-s")
+        cms.exchange.import_body(tmp_path / "short.npz", units="mm-t-s")
 
 
 def test_a_sign_that_two_statements_deny_is_refused(mean, tmp_path):
@@ -278,7 +283,7 @@ def test_a_sign_that_two_statements_deny_is_refused(mean, tmp_path):
         arrays = {key: archive[key] for key in archive.files}
     np.savez(path, **{**arrays, "mPsiTildePsiTilde": -arrays["mPsiTildePsiTilde"]})
     with pytest.raises(ForeignBodyError, match="trace of 5C differ"):
-        cms.import_body(path, units="mm-t-s")
+        cms.exchange.import_body(path, units="mm-t-s")
 
 
 def test_a_superelement_of_openfast_comes_back(tmp_path):
@@ -287,12 +292,12 @@ def test_a_superelement_of_openfast_comes_back(tmp_path):
     path = tmp_path / "platform.dat"
     export_body(own, path, to="ext_ptfm", units=own.units)
     place = own.frame.origin + own.frame.axes @ own.interface("left").position
-    body = cms.import_body(path, units="m-kg-s", nodes={1: place})
+    body = cms.exchange.import_body(path, units="m-kg-s", nodes={1: place})
     assert_allclose(body.free_frequencies, own.free_frequencies, rtol=1e-8)
     assert_allclose(body.moments.J0, own.moments.J0, rtol=0, atol=1e-8 * np.abs(own.moments.J0).max())
     assert body.moments.missing == ("3C", "4C", "5C")
     assert [i.name for i in body.interfaces] == ["node 1"]
-    assert "placed at the origin" in cms.import_body(path, units="m-kg-s").provenance["note 1"]
+    assert "placed at the origin" in cms.exchange.import_body(path, units="m-kg-s").provenance["note 1"]
     text = path.read_text()
     n = 6 + 4
     for pattern, to, words in (
@@ -305,7 +310,7 @@ def test_a_superelement_of_openfast_comes_back(tmp_path):
         assert changed != text
         path.write_text(changed)
         with pytest.raises(ForeignBodyError, match=words):
-            cms.import_body(path, units="m-kg-s")
+            cms.exchange.import_body(path, units="m-kg-s")
 
 
 @pytest.mark.parametrize("key", ["mbdyn", "sid_fem", "sid_fem-fembeam"])
@@ -313,14 +318,14 @@ def test_geometric_stiffness_comes_back(key, tmp_path):
     part = cms.couple(bar(nx=3, width=0.07, height=0.04))
     own = cms.reduce(part, cms.craig_bampton(part, n_modes=1), stress=False)
     path = written(own, key, tmp_path)
-    body = cms.import_body(path, units=own.units, interfaces=names_of(own, key))
+    body = cms.exchange.import_body(path, units=own.units, interfaces=names_of(own, key))
     flip = np.sign(np.einsum("ak,ak->k", body.interface("left").Psi[:3], own.interface("left").Psi[:3]) + 1e-300)
     signs = flip[:, None] * flip
     for name in ("spin", "rotation", "interfaces", "translation"):
         expected = getattr(own.geometric, name)
         size = max(np.abs(expected).max(), 1e-6 * np.abs(own.geometric.interfaces).max())
         assert_allclose(getattr(body.geometric, name) * signs, expected, rtol=0, atol=1e-6 * size)
-    together = cms.import_body(path, units=own.units, interfaces={"both": [1, 2]})
+    together = cms.exchange.import_body(path, units=own.units, interfaces={"both": [1, 2]})
     assert together.geometric is None
 
 

@@ -114,7 +114,7 @@ def lumped():
     mass = diagonal * 7850.0 * 0.8 * 0.06 * 0.05 / diagonal.sum()
     ends = [replace(i, kind="nodes") for i in part.interfaces]
     return cms.couple(
-        fe_models.body_from_matrices(
+        fe_models.files.body_from_matrices(
             sp.diags_array(np.repeat(mass, 3)), part.K, part.nodes, part.dofs, name="lumped", units=SI, interfaces=ends
         )
     )

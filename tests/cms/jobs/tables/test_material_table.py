@@ -6,7 +6,8 @@ from cms.errors import JobError
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
 from cms.jobs.shell_body import shell_properties_of
-from fe_models import OrthotropicMaterial, read_mesh, solid_body, unit_system
+from fe_models import read_mesh, solid_body, unit_system
+from fe_models.body import OrthotropicMaterial
 from fe_models.errors import MaterialError
 from tests.bodies import box_mesh
 

@@ -138,7 +138,7 @@ def test_the_command_goes_before_the_job_and_the_file_says_who_factorised(folder
 
 
 def test_jobs_of_a_fleet_take_the_solver_too(folder, registered):
-    rows = cms.reduce_fleet([folder / "plain.toml"], [folder / "fleet.h5"], workers=1, solver="dense")
+    rows = cms.reduction.reduce_fleet([folder / "plain.toml"], [folder / "fleet.h5"], workers=1, solver="dense")
     assert [row.error for row in rows] == [""]
     assert solver_in(folder / "fleet.h5") == "dense"
 

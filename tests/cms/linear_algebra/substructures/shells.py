@@ -16,9 +16,11 @@ def panel(n=14):
     def place(u, v):
         return np.stack([0.7 * np.sin(1.5 * (u - 0.5)), 0.8 * v, 0.7 * np.cos(1.5 * u) + 0.1 * np.sin(3 * v)], axis=1)
 
-    mesh = fm.mapped_shell(place, n, n)
-    edges = [fm.shell_interface(mesh, name, fm.NodeSet(name)) for name in ("u0", "u1")]
-    return cms.couple(fm.shell_body(mesh, fm.ShellProperty(0.005, SHEET), name="panel", units=SI, interfaces=edges))
+    mesh = fm.shells.mapped_shell(place, n, n)
+    edges = [fm.shells.shell_interface(mesh, name, fm.selections.NodeSet(name)) for name in ("u0", "u1")]
+    return cms.couple(
+        fm.shell_body(mesh, fm.shells.ShellProperty(0.005, SHEET), name="panel", units=SI, interfaces=edges)
+    )
 
 
 def between(kind, nx=9):

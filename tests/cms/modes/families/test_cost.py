@@ -47,7 +47,7 @@ def test_one_that_is_very_large_is_made_where_it_is_asked_for_only(body, modes, 
     caplog.clear()
     assert cms.reduce(body, modes, geometric=True).geometric is not None
     assert "geometric stiffness" not in cms.reduce(body, modes, geometric=False).provenance
-    few = cms.with_characteristic_modes(modes, body, n_modes=3)
+    few = cms.modes.with_characteristic_modes(modes, body, n_modes=3)
     assert cms.reduce(body, few).geometric is not None
     assert not caplog.records
 
@@ -87,13 +87,15 @@ def test_chosen_loads_go_to_a_file_and_back_and_to_other_frames(body, modes, tmp
     read = cms.read(tmp_path / "chosen.h5")
     assert read.geometric.is_loaded == (False, True)
     np.testing.assert_array_equal(read.geometric.interfaces, chosen.geometric.interfaces)
-    there = cms.convert_frame(cms.reduce(body, modes), cms.NodalFrame("right")).geometric
-    changed = cms.convert_frame(read, cms.NodalFrame("right")).geometric
+    there = cms.reduction.convert_frame(cms.reduce(body, modes), cms.NodalFrame("right")).geometric
+    changed = cms.reduction.convert_frame(read, cms.NodalFrame("right")).geometric
     assert changed.is_loaded == (False, True)
     assert_close(changed.spin, there.spin)
     assert_close(changed.spread.K, there.spread.K)
     with pytest.raises(BodyError, match=r"the loads at interface 'right' were left out"):
-        cms.convert_frame(cms.reduce(body, modes, geometric=unit_states(body, interfaces=[])), cms.NodalFrame("right"))
+        cms.reduction.convert_frame(
+            cms.reduce(body, modes, geometric=unit_states(body, interfaces=[])), cms.NodalFrame("right")
+        )
 
 
 def assert_close(K, expected):

@@ -19,17 +19,19 @@ from tests.fe_models.small_shells import SI, STEEL
 SETS = {
     "craig_bampton": cms.craig_bampton,
     "rubin": cms.rubin,
-    "craig_chang": cms.craig_chang,
-    "herting": cms.herting,
+    "craig_chang": cms.modes.craig_chang,
+    "herting": cms.modes.herting,
 }
 
 
 def beam(n):
     """A bar of n elements with an interface at both ends."""
-    line = fm.straight_line((0, 0, 0), (1, 0, 0), n)
-    ends = [fm.line_interface(line, name, fm.NodeSet(name)) for name in ("start", "end")]
+    line = fm.beams.straight_line((0, 0, 0), (1, 0, 0), n)
+    ends = [fm.beams.line_interface(line, name, fm.selections.NodeSet(name)) for name in ("start", "end")]
     return cms.couple(
-        fm.beam_body(line, fm.BeamProperty(fm.Rectangle(0.03, 0.02), STEEL), name="b", units=SI, interfaces=ends)
+        fm.beam_body(
+            line, fm.beams.BeamProperty(fm.beams.Rectangle(0.03, 0.02), STEEL), name="b", units=SI, interfaces=ends
+        )
     )
 
 
@@ -60,7 +62,7 @@ def test_two_masses_at_one_place_keep_their_frequencies_in_all_units(units, name
     M, K = (each * np.outer(size, size) / system.mass for each in (M, K))
     nodes, dofs = np.tile(np.array([0.3, 0.2, -0.1]) / system.length, (2, 1)), list(np.ndindex(2, 6))
     at = fm.Interface("a", "nodes", np.array([0]), nodes[0])
-    body = cms.couple(fm.body_from_matrices(M, K, nodes, dofs, name="two", units=system, interfaces=[at]))
+    body = cms.couple(fm.files.body_from_matrices(M, K, nodes, dofs, name="two", units=system, interfaces=[at]))
     assert_allclose(cms.reduce(body, SETS[name](body, n_modes=6)).free_frequencies, expected, rtol=1e-8)
 
 
@@ -74,12 +76,12 @@ def test_more_modes_than_there_are_are_refused_with_the_number():
 
 def test_a_cutoff_of_a_body_without_interior_dofs_finds_no_modes():
     body = beam(1)
-    assert len(cms.reduce(body, cms.craig_bampton(body, cms.ModeCount(cutoff=100.0))).K) == 6
+    assert len(cms.reduce(body, cms.craig_bampton(body, cms.modes.ModeCount(cutoff=100.0))).K) == 6
 
 
 def test_an_interface_of_very_many_dofs_announces_its_cost_before_the_work(monkeypatch, caplog):
     mesh = box_mesh(4, 4, 2)
-    left = fm.nodes_interface(mesh, "left", fm.NodeSet("left"))
+    left = fm.body.nodes_interface(mesh, "left", fm.selections.NodeSet("left"))
     body = cms.couple(fm.solid_body(mesh, STEEL, name="block", units=SI, interfaces=[left]))
     assert large_interfaces(body) == []
     monkeypatch.setattr(cost, "MANY", 45)
@@ -98,8 +100,8 @@ def test_an_interface_of_very_many_dofs_announces_its_cost_before_the_work(monke
 def test_the_cost_of_a_reduction_grows_as_its_arrays_do():
     mesh = box_mesh(4, 4, 2)
     sides = [
-        fm.nodes_interface(mesh, "left", fm.NodeSet("left")),
-        fm.rigid_interface(mesh, "right", fm.NodeSet("right")),
+        fm.body.nodes_interface(mesh, "left", fm.selections.NodeSet("left")),
+        fm.rigid_interface(mesh, "right", fm.selections.NodeSet("right")),
     ]
     body = cms.couple(fm.solid_body(mesh, STEEL, name="block", units=SI, interfaces=sides))
     assert (interface_reduction_size(body, 20), interface_reduction_size(body, 100)) == (32, 51)
@@ -117,7 +119,13 @@ def test_the_file_of_a_reduction_is_as_large_as_was_said(tmp_path):
     """Numbers that deflate leaves as they are: M, K and D, which are diagonal, are small here."""
     mesh = box_mesh(8, 6, 6)
     body = cms.couple(
-        fm.solid_body(mesh, STEEL, name="b", units=SI, interfaces=[fm.nodes_interface(mesh, "l", fm.NodeSet("left"))])
+        fm.solid_body(
+            mesh,
+            STEEL,
+            name="b",
+            units=SI,
+            interfaces=[fm.body.nodes_interface(mesh, "l", fm.selections.NodeSet("left"))],
+        )
     )
     modes = cms.craig_bampton(body, n_modes=3)
     cms.write(cms.reduce(body, modes, geometric=False), tmp_path / "b.h5")
@@ -163,11 +171,11 @@ def test_bricks_welded_at_distributing_interfaces_swing_as_the_constrained_penci
             C[6 * k : 6 * k + 6, rows] = sign * mean_motion(parts[part].nodes[faces[part][side]], at)
     Z = la.null_space(C)
     expected = np.sqrt(la.eigh(Z.T @ K @ Z, Z.T @ M @ Z, eigvals_only=True)[6:10]) / (2 * np.pi)
-    reduced = cms.reduce(whole, cms.rubin(cms.Families(whole, solver=solver), n_modes=4))
+    reduced = cms.reduce(whole, cms.rubin(cms.modes.Families(whole, solver=solver), n_modes=4))
     assert_allclose(reduced.free_frequencies[:4], expected, rtol=1e-8)
 
 
-@pytest.mark.parametrize("make", [cms.rubin, cms.dual_craig_bampton, cms.craig_chang])
+@pytest.mark.parametrize("make", [cms.rubin, cms.modes.dual_craig_bampton, cms.modes.craig_chang])
 @pytest.mark.parametrize("n_modes", [19, 27])
 def test_modes_and_residuals_that_fill_the_space_leave_no_massless_shape(make, n_modes):
     """Two distributing interfaces: rounding of the residuals breaks their constraints, and came as four shapes more."""
@@ -195,12 +203,12 @@ def test_the_inner_motions_of_two_beams_are_counted(name, spring, n_inner, geome
     triad[:, 2] *= np.linalg.det(triad)
     nodes = np.concatenate([np.linspace(0, 1, 6), np.linspace(1, 2, 6)])[:, None] * along + np.array([5.0, -3.0, 2.0])
     lines = np.array([(i, i + 1) for i in range(5)] + [(6 + i, 7 + i) for i in range(5)])
-    mesh = fm.LineMesh(nodes, lines, node_sets={"a": np.array([0]), "b": np.array([11])})
-    turn = [] if spring is None else [fm.Spring((5, 6), np.array(spring), triad=triad)]
+    mesh = fm.beams.LineMesh(nodes, lines, node_sets={"a": np.array([0]), "b": np.array([11])})
+    turn = [] if spring is None else [fm.beams.Spring((5, 6), np.array(spring), triad=triad)]
     body = cms.couple(
         fm.beam_body(
-            mesh, fm.BeamProperty(fm.Rectangle(0.03, 0.05), STEEL), name="b", units=SI, springs=turn,
-            interfaces=[fm.line_interface(mesh, end, fm.NodeSet(end)) for end in "ab"],
+            mesh, fm.beams.BeamProperty(fm.beams.Rectangle(0.03, 0.05), STEEL), name="b", units=SI, springs=turn,
+            interfaces=[fm.beams.line_interface(mesh, end, fm.selections.NodeSet(end)) for end in "ab"],
         )
     )  # fmt: skip
     what = "6 motions" if n_inner == 6 else f"{n_inner} motion{'s' if n_inner > 1 else ''}"
@@ -210,9 +218,9 @@ def test_the_inner_motions_of_two_beams_are_counted(name, spring, n_inner, geome
 
 def test_a_wire_whose_torsion_is_lost_in_the_mass_matrix_is_refused_with_the_number():
     """EA L²/EI = 2e13 across the axes of the mesh: M has the torsion of two long elements beside their bending."""
-    line = fm.straight_line((0, 0, 0), (1 / 3, 2 / 3, 2 / 3), 2)
-    ends = [fm.line_interface(line, name, fm.NodeSet(name)) for name in ("start", "end")]
-    thin = fm.BeamProperty(fm.Circle(4.5e-7), STEEL)
+    line = fm.beams.straight_line((0, 0, 0), (1 / 3, 2 / 3, 2 / 3), 2)
+    ends = [fm.beams.line_interface(line, name, fm.selections.NodeSet(name)) for name in ("start", "end")]
+    thin = fm.beams.BeamProperty(fm.beams.Circle(4.5e-7), STEEL)
     body = cms.couple(fm.beam_body(line, thin, name="wire", units=SI, interfaces=ends))
     with pytest.raises(BodyError, match=r"the mass of a shape has a relative rounding error of \d\.\de-0[3-6].*rotate"):
         cms.reduce(body, cms.craig_bampton(body, n_modes=4), geometric=False)
@@ -224,9 +232,9 @@ def test_a_wire_swings_like_a_free_beam(name, along):
     """EA L²/EI = 1e13 along an axis of the mesh, and 3e11 across it, where entries of K hold bending and tension."""
     ratio = 1e13 if along[1] == 0 else 3e11
     width = np.sqrt(12 / ratio)
-    mesh = fm.straight_line((0, 0, 0), tuple(np.array(along) / np.linalg.norm(along)), 12)
-    ends = [fm.line_interface(mesh, end, fm.NodeSet(end)) for end in ("start", "end")]
-    section = fm.BeamProperty(fm.Rectangle(width, width), STEEL)
+    mesh = fm.beams.straight_line((0, 0, 0), tuple(np.array(along) / np.linalg.norm(along)), 12)
+    ends = [fm.beams.line_interface(mesh, end, fm.selections.NodeSet(end)) for end in ("start", "end")]
+    section = fm.beams.BeamProperty(fm.beams.Rectangle(width, width), STEEL)
     body = cms.couple(fm.beam_body(mesh, section, name="wire", units=SI, interfaces=ends))
     reduced = cms.reduce(body, SETS[name](body, n_modes=10))
     bending = width * np.sqrt(STEEL.E / 12 / STEEL.rho) / (2 * np.pi)  # of radius of gyration width / sqrt(12)

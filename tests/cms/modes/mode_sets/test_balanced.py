@@ -213,9 +213,9 @@ def test_bad_options_are_refused(options, text):
 
 
 def test_a_small_body_is_balanced_without_asking_for_its_highest_modes():
-    line = fm.straight_line((0, 0, 0), (1, 0, 0), 21)
-    ends = [fm.line_interface(line, name, fm.NodeSet(name)) for name in ("start", "end")]
-    section = fm.BeamProperty(fm.Circle(0.01), fm.Material("steel", E=2.1e11, nu=0.3, rho=7850.0))
+    line = fm.beams.straight_line((0, 0, 0), (1, 0, 0), 21)
+    ends = [fm.beams.line_interface(line, name, fm.selections.NodeSet(name)) for name in ("start", "end")]
+    section = fm.beams.BeamProperty(fm.beams.Circle(0.01), fm.Material("steel", E=2.1e11, nu=0.3, rho=7850.0))
     body = couple(fm.beam_body(line, section, name="rod", units=unit_system("m-kg-s"), interfaces=ends))
     modes = balanced_truncation(fm.planar(body, normal=2), n_modes=4)
     sigma = modes.data["position-velocity"]

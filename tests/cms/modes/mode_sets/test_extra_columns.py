@@ -140,7 +140,7 @@ def test_centrifugal_loads_sum_to_the_force_of_any_rotation():
 
 def test_a_flat_beam_takes_the_torque_that_turns_it_into_the_plane_of_rotation():
     """f_yz = -rho (c_y e_z + c_z e_y) / 2 has the torque -rho (∫ y² - ∫ z²) / 2 about the axis of the beam."""
-    body = straight(n=5, section=fm.Rectangle(0.02, 0.05), length=1.3)
+    body = straight(n=5, section=fm.beams.Rectangle(0.02, 0.05), length=1.3)
     loads = {case.name: case.f.reshape(-1, 6) for case in centrifugal_loads(body)}
     width, height = np.ptp(body.nodes[6:, 1]), np.ptp(body.nodes[6:, 2])  # of the skin
     second = STEEL.rho * width * height / 12 * np.array([width**2, height**2])
@@ -189,9 +189,11 @@ def test_centrifugal_loads_of_eliminated_dofs_must_come_before_coupling(body):
 def test_a_rest_that_is_rigid_motion_of_a_slender_frame_is_no_column(make):
     """Its energy is rounding, of either sign, and it was scaled to unit energy: columns of 1e6 beside others of 1."""
     points = Rotation.random(random_state=2).apply([(0, 0, 0), (0.5, 0.1, 0), (1, 0, 0.1), (1.4, 0.3, 0.2)])
-    mesh = fm.LineMesh(points, [(0, 1), (1, 2), (2, 3)])
-    joints = [fm.line_interface(mesh, name, fm.NodeIndices((k,))) for name, k in (("left", 0), ("right", 3))]
-    section = fm.BeamProperty(fm.Rectangle(0.003, 0.003), STEEL)
+    mesh = fm.beams.LineMesh(points, [(0, 1), (1, 2), (2, 3)])
+    joints = [
+        fm.beams.line_interface(mesh, name, fm.beams.NodeIndices((k,))) for name, k in (("left", 0), ("right", 3))
+    ]
+    section = fm.beams.BeamProperty(fm.beams.Rectangle(0.003, 0.003), STEEL)
     free = fm.beam_body(mesh, section, name="wire", units=unit_system("m-kg-s"), interfaces=joints)
     push = np.zeros(free.n_dof)
     push[6:9] = [1.0, 2.0, 3.0]

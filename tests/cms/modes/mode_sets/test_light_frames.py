@@ -9,7 +9,14 @@ import cms
 import fe_models as fm
 from cms.errors import EigenError
 
-SETS = (cms.craig_bampton, cms.craig_bampton_ir, cms.rubin, cms.herting, cms.craig_chang, cms.attachment)
+SETS = (
+    cms.craig_bampton,
+    cms.modes.craig_bampton_ir,
+    cms.rubin,
+    cms.modes.herting,
+    cms.modes.craig_chang,
+    cms.modes.attachment,
+)
 
 
 def frame(seed, rho):
@@ -17,10 +24,10 @@ def frame(seed, rho):
     rng = np.random.default_rng(seed)
     n = int(rng.integers(5, 9))
     points = rng.normal(size=(n, 3))
-    mesh = fm.LineMesh(points, np.array([[k, k + 1] for k in range(n - 1)]))
+    mesh = fm.beams.LineMesh(points, np.array([[k, k + 1] for k in range(n - 1)]))
     at = rng.choice(n, int(rng.integers(4, n + 1)), replace=False)
-    masses = [fm.PointMass(int(k), mass=float(rng.uniform(1, 20))) for k in at]
-    section = fm.BeamProperty(fm.Rectangle(0.05, 0.075), fm.Material("light", E=2e11, nu=0.3, rho=rho))
+    masses = [fm.beams.PointMass(int(k), mass=float(rng.uniform(1, 20))) for k in at]
+    section = fm.beams.BeamProperty(fm.beams.Rectangle(0.05, 0.075), fm.Material("light", E=2e11, nu=0.3, rho=rho))
     body = fm.beam_body(mesh, section, name="frame", units=cms.unit_system("m-kg-s"), point_masses=masses)
     ends = (
         fm.Interface("a", "nodes", np.array([0]), points[0]),
@@ -70,10 +77,10 @@ def test_more_modes_than_have_mass_are_refused_by_their_number():
 @pytest.mark.parametrize("size", [1.0, 1e-3, 3e-5])
 def test_frequencies_of_a_small_beam_go_with_its_size(size):
     """A beam of silicon in m-kg-s, from a metre to micrometres: frequency times length stays."""
-    mesh = fm.straight_line((0, 0, 0), (size, 0, 0), 8)
-    section = fm.Rectangle(0.03 * size, 0.02 * size)
+    mesh = fm.beams.straight_line((0, 0, 0), (size, 0, 0), 8)
+    section = fm.beams.Rectangle(0.03 * size, 0.02 * size)
     silicon = fm.Material("silicon", E=1.6e11, nu=0.25, rho=2330.0)
-    body = fm.beam_body(mesh, fm.BeamProperty(section, silicon), name="b", units=cms.unit_system("m-kg-s"))
+    body = fm.beam_body(mesh, fm.beams.BeamProperty(section, silicon), name="b", units=cms.unit_system("m-kg-s"))
     ends = (fm.Interface(name, "rigid", np.array([k]), body.nodes[k]) for name, k in (("a", 0), ("z", 8)))
     body = cms.couple(body.with_interfaces(*ends))
     for make in (cms.craig_bampton, cms.rubin):
@@ -85,11 +92,11 @@ def test_frequencies_of_a_small_beam_go_with_its_size(size):
 
 def test_all_interior_modes_of_a_plate_are_found():
     """Drilling modes of shells are a million times above the first: fixed-interface modes beside dense ones."""
-    mesh = fm.flat_plate(1.3, 0.4, 3, 2)
+    mesh = fm.shells.flat_plate(1.3, 0.4, 3, 2)
     x = mesh.nodes[:, 0]
     ends = [np.flatnonzero(x < 1e-9), np.flatnonzero(x > x.max() - 1e-9)]
     for thickness in (0.06, 0.006):
-        steel = fm.ShellProperty(thickness, fm.Material("m", E=2e11, nu=0.3, rho=7800.0))
+        steel = fm.shells.ShellProperty(thickness, fm.Material("m", E=2e11, nu=0.3, rho=7800.0))
         body = fm.shell_body(mesh, steel, name="b", units=cms.unit_system("m-kg-s"))
         both = [fm.Interface(n, "rigid", e, body.nodes[e].mean(0)) for n, e in zip("ab", ends, strict=True)]
         body = cms.couple(body.with_interfaces(*both))

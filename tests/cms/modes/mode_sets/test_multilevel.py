@@ -27,12 +27,12 @@ def shell():
 @pytest.fixture(scope="module")
 def direct(shell):
     """All modes far beyond the wanted ones, by block Lanczos."""
-    return cms.craig_bampton_ir(shell, n_modes=2 * N)
+    return cms.modes.craig_bampton_ir(shell, n_modes=2 * N)
 
 
 @pytest.fixture(scope="module")
 def modes(shell):
-    return cms.multilevel(shell, n_modes=ModeCount(N, verify=True), inertia_relief=True)
+    return cms.modes.multilevel(shell, n_modes=ModeCount(N, verify=True), inertia_relief=True)
 
 
 def interior_of(body):
@@ -68,7 +68,10 @@ def test_a_guess_that_is_too_high_keeps_no_more_modes_of_substructures(shell, di
     guessed = modes_module.guessed_omega2
     monkeypatch.setattr(modes_module, "guessed_omega2", lambda *of: times * guessed(*of))
     kept = int(
-        cms.multilevel(shell, n_modes=N, cutoff_factor=3.0).options["eigensolver"].split(" in a tree, ")[1].split()[0]
+        cms.modes.multilevel(shell, n_modes=N, cutoff_factor=3.0)
+        .options["eigensolver"]
+        .split(" in a tree, ")[1]
+        .split()[0]
     )
     highest = (2 * np.pi * direct.frequencies[np.isfinite(direct.frequencies)][N - 1]) ** 2
     interior = interior_of(shell)
@@ -98,21 +101,21 @@ def test_modes_are_orthonormal_and_vanish_on_the_boundary(shell, modes):
 
 
 def test_many_modes_of_substructures_need_no_step(shell, direct):
-    modes = cms.multilevel(shell, n_modes=N)
+    modes = cms.modes.multilevel(shell, n_modes=N)
     assert "0 steps" in modes.options["eigensolver"]
     assert 1e-6 < relative_errors(modes, direct).max() < 1e-3
 
 
 def test_a_tighter_tolerance_takes_more_steps_and_is_met(shell, direct):
-    modes = cms.multilevel(shell, n_modes=N, tolerance=1e-6, cutoff_factor=3.0)
+    modes = cms.modes.multilevel(shell, n_modes=N, tolerance=1e-6, cutoff_factor=3.0)
     assert "1 steps" not in modes.options["eigensolver"]
     assert np.abs(relative_errors(modes, direct)).max() < 1e-6
 
 
 def test_where_a_few_modes_are_above_the_tolerance_one_step_improves_all(shell, direct):
-    before = cms.multilevel(shell, n_modes=N, cutoff_factor=14.0)
+    before = cms.modes.multilevel(shell, n_modes=N, cutoff_factor=14.0)
     tolerance = np.sort(before.data["frequency error"][-N:])[-4]
-    modes = cms.multilevel(shell, n_modes=N, cutoff_factor=14.0, tolerance=tolerance)
+    modes = cms.modes.multilevel(shell, n_modes=N, cutoff_factor=14.0, tolerance=tolerance)
     assert "1 steps" in modes.options["eigensolver"]
     assert relative_errors(before, direct).max() > tolerance
     assert relative_errors(modes, direct).max() < tolerance
@@ -122,7 +125,7 @@ def test_where_a_few_modes_are_above_the_tolerance_one_step_improves_all(shell, 
 
 def test_what_stays_above_the_tolerance_is_told(shell, caplog):
     with caplog.at_level(logging.WARNING):
-        modes = cms.multilevel(shell, n_modes=N, tolerance=1e-10, cutoff_factor=1.2)
+        modes = cms.modes.multilevel(shell, n_modes=N, tolerance=1e-10, cutoff_factor=1.2)
     above = modes.data["frequency error"][-N:] > 1e-10
     if not above.any():
         pytest.fail("choose a case that does not converge")
@@ -133,7 +136,7 @@ def test_what_stays_above_the_tolerance_is_told(shell, caplog):
 def test_a_cutoff_finds_all_modes_below_it(shell, direct):
     frequencies = direct.frequencies[np.isfinite(direct.frequencies)]
     cutoff = (frequencies[N - 1] + frequencies[N]) / 2
-    modes = cms.multilevel(shell, n_modes=ModeCount(cutoff=cutoff, verify=True))
+    modes = cms.modes.multilevel(shell, n_modes=ModeCount(cutoff=cutoff, verify=True))
     assert len(relative_errors(modes, direct)) == N
     assert np.abs(relative_errors(modes, direct)).max() < 1e-3
 
@@ -142,18 +145,18 @@ def test_modes_that_come_below_a_cutoff_late_are_not_left_out(shell, direct, mon
     frequencies = direct.frequencies[np.isfinite(direct.frequencies)]
     cutoff = (frequencies[N - 1] + frequencies[N]) / 2
     monkeypatch.setattr("cms.linear_algebra.substructures.modes.MARGIN", frequencies[N - 4] / cutoff)
-    modes = cms.multilevel(shell, n_modes=ModeCount(cutoff=cutoff))
+    modes = cms.modes.multilevel(shell, n_modes=ModeCount(cutoff=cutoff))
     assert len(relative_errors(modes, direct)) == N
     assert modes.data["frequency error"][-N:].max() < 1e-3
     monkeypatch.setattr("cms.linear_algebra.substructures.modes.GUARDS", 1)
     monkeypatch.setattr("cms.linear_algebra.substructures.modes.GUARD_SHARE", 0.0)
-    with pytest.raises(cms.CmsError, match=r"are below this frequency.*choose a larger cutoff_factor"):
-        cms.multilevel(shell, n_modes=ModeCount(cutoff=cutoff))
+    with pytest.raises(cms.errors.CmsError, match=r"are below this frequency.*choose a larger cutoff_factor"):
+        cms.modes.multilevel(shell, n_modes=ModeCount(cutoff=cutoff))
 
 
 def test_a_body_that_is_one_leaf_is_solved_exactly():
     body = cms.couple(bar(nx=3, kind="hexahedron"))
-    modes, direct = cms.multilevel(body, n_modes=5), cms.craig_bampton(body, n_modes=5)
+    modes, direct = cms.modes.multilevel(body, n_modes=5), cms.craig_bampton(body, n_modes=5)
     assert modes.options["substructures"].startswith("1 in 1 levels")
     assert_allclose(relative_errors(modes, direct), 0, rtol=0, atol=1e-9)
 
@@ -161,7 +164,7 @@ def test_a_body_that_is_one_leaf_is_solved_exactly():
 @pytest.mark.parametrize("kind", ["rigid", "distributing"])
 def test_solids_with_both_kinds_of_interfaces(kind):
     body = between(kind)
-    modes, direct = cms.multilevel(body, n_modes=ModeCount(8, verify=True)), cms.craig_bampton(body, n_modes=12)
+    modes, direct = cms.modes.multilevel(body, n_modes=ModeCount(8, verify=True)), cms.craig_bampton(body, n_modes=12)
     errors = relative_errors(modes, direct)
     assert errors.min() > -1e-8
     assert errors.max() < 1e-3
@@ -171,8 +174,8 @@ def test_solids_with_both_kinds_of_interfaces(kind):
 
 @pytest.mark.parametrize("solver", [None, Solver("slepc", SuperLuFactor)])  # whose own search needs its own factor
 def test_other_sets_of_the_same_families_use_the_tree(shell, monkeypatch, direct, solver):
-    with cms.Families(shell, solver=solver) as families:
-        cms.multilevel(families, n_modes=2)
+    with cms.modes.Families(shell, solver=solver) as families:
+        cms.modes.multilevel(families, n_modes=2)
         monkeypatch.setattr("cms.modes.families.fixed_interface.factorize", None)
         other = cms.craig_bampton(families, n_modes=6)
         assert "tree of" in families.fixed.factorization.description
@@ -183,7 +186,7 @@ def test_other_sets_of_the_same_families_use_the_tree(shell, monkeypatch, direct
 def test_the_reduced_body_is_that_of_craig_bampton(shell, modes, tmp_path):
     """Rigid moments are exact, the modal ones obey tr S_kl = M; free frequencies are close."""
     one = cms.reduce(shell, modes, geometric=False)
-    two = cms.reduce(shell, cms.craig_bampton_ir(shell, n_modes=N), geometric=False)
+    two = cms.reduce(shell, cms.modes.craig_bampton_ir(shell, n_modes=N), geometric=False)
     assert_allclose(one.moments.m, two.moments.m, rtol=1e-12)
     assert_allclose(one.moments.R, two.moments.R, rtol=0, atol=1e-9 * np.abs(two.moments.R).max())
     rotary = 0.05  # inertia, which is no part of the moments
@@ -195,7 +198,7 @@ def test_the_reduced_body_is_that_of_craig_bampton(shell, modes, tmp_path):
 
 
 def test_no_modes_at_all_are_constraint_modes(shell):
-    assert cms.multilevel(shell, n_modes=0).labels == cms.guyan(shell).labels
+    assert cms.modes.multilevel(shell, n_modes=0).labels == cms.modes.guyan(shell).labels
 
 
 @pytest.mark.parametrize(
@@ -209,19 +212,19 @@ def test_no_modes_at_all_are_constraint_modes(shell):
 )
 def test_bad_options_are_refused(shell, options, words):
     with pytest.raises(ModeSetError, match=words):
-        cms.multilevel(shell, **options)
+        cms.modes.multilevel(shell, **options)
 
 
 def test_a_large_part_of_all_modes_is_refused(shell):
     with pytest.raises(ModeSetError, match="expected at most 1 in 8 of them; take craig-bampton"):
-        cms.multilevel(shell, n_modes=len(shell.i) // 7)
+        cms.modes.multilevel(shell, n_modes=len(shell.i) // 7)
 
 
 @pytest.mark.parametrize("factor", [1.2, 1.5])
 @pytest.mark.parametrize("count", [8, 24])
 def test_small_cutoff_factors_leave_as_many_modes_as_are_wanted_and_guards(shell, direct, count, factor):
     """Before, 6 to 24 modes of substructures were kept."""
-    modes = cms.multilevel(shell, n_modes=count, cutoff_factor=factor)
+    modes = cms.modes.multilevel(shell, n_modes=count, cutoff_factor=factor)
     errors = relative_errors(modes, direct)
     assert len(errors) == count
     assert modes.data["frequency error"][-count:].max() < 1e-3
@@ -231,14 +234,14 @@ def test_small_cutoff_factors_leave_as_many_modes_as_are_wanted_and_guards(shell
 def test_a_guess_that_is_too_low_is_made_up_for(shell, direct, monkeypatch):
     guessed = modes_module.guessed_omega2
     monkeypatch.setattr(modes_module, "guessed_omega2", lambda *of: guessed(*of) / 40)
-    modes = cms.multilevel(shell, n_modes=N, cutoff_factor=3.0)
+    modes = cms.modes.multilevel(shell, n_modes=N, cutoff_factor=3.0)
     assert 0 < relative_errors(modes, direct).max() < 1e-3
 
 
 def test_more_modes_than_the_substructures_keep_are_refused(shell, monkeypatch):
     monkeypatch.setattr("cms.linear_algebra.substructures.modes.guessed_omega2", lambda *_: 1.0)
-    with pytest.raises(cms.CmsError, match="choose a larger cutoff_factor"):
-        cms.multilevel(shell, n_modes=N)
+    with pytest.raises(cms.errors.CmsError, match="choose a larger cutoff_factor"):
+        cms.modes.multilevel(shell, n_modes=N)
 
 
 def test_interfaces_that_do_not_hold_the_body_are_refused():
@@ -250,7 +253,7 @@ def test_interfaces_that_do_not_hold_the_body_are_refused():
 
     body = cms.couple(replace(free, interfaces=(corner,)))
     with pytest.raises(ModeSetError, match="leave a rigid-body motion free"):
-        cms.multilevel(body, n_modes=3)
+        cms.modes.multilevel(body, n_modes=3)
 
 
 def test_a_part_that_nothing_holds_is_refused_although_its_pivots_are_positive():
@@ -273,4 +276,4 @@ def test_a_mechanism_is_told_by_its_nodes():
     K[loose, :] = 0
     K[:, loose] = 0
     with pytest.raises(BodyError, match="with all interfaces held"):
-        cms.multilevel(replace(body, K=sp.csc_array(K.tocsc())), n_modes=3)
+        cms.modes.multilevel(replace(body, K=sp.csc_array(K.tocsc())), n_modes=3)

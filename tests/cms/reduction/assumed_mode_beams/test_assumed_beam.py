@@ -14,7 +14,7 @@ from cms.modes.mode_sets.axis_functions import AXIS_FUNCTIONS
 STEEL = fm.Material("steel", E=2.0e11, nu=0.3, rho=7870.0)
 UNITS = cms.unit_system("m-kg-s")
 LENGTH = 1.0
-SECTION = fm.Rectangle(0.03, 0.02)
+SECTION = fm.beams.Rectangle(0.03, 0.02)
 CLAMPED_FREE = (1.8751040687, 4.6940911330, 7.8547574382)
 FREE_FREE = (4.7300407449, 7.8532046241, 10.9956078380)
 
@@ -22,12 +22,12 @@ FREE_FREE = (4.7300407449, 7.8532046241, 10.9956078380)
 def slender(**changes):
     """Bending without rotary inertia to speak of, no shear: Euler and Bernoulli's beam."""
     values = {"rho_A": 2.0, "EA": 1e7, "EIy": 30.0, "EIz": 50.0, "GJ": 20.0, "rho_Iy": 1e-9, "rho_Iz": 1e-9} | changes
-    return cms.BeamLine(LENGTH, **values)
+    return fm.beams.BeamLine(LENGTH, **values)
 
 
 def made(line, n=8, **options):
     values = {"n_axial": 3, "n_bending": n, "n_torsion": 3} | options
-    return cms.beam_from_assumed_modes(line, name="beam", units=UNITS, **values)
+    return cms.reduction.beam_from_assumed_modes(line, name="beam", units=UNITS, **values)
 
 
 @pytest.mark.parametrize("functions", AXIS_FUNCTIONS)
@@ -51,12 +51,15 @@ def test_families_of_polynomials_span_the_same_space():
 
 def fine_body(frame, n_modes, n):
     """The same functions on a mesh of n beam elements."""
-    mesh = fm.straight_line((0, 0, 0), (LENGTH, 0, 0), n)
-    item = fm.BeamProperty(SECTION, STEEL, orientation=(0, 1, 0), shear=False)
-    ends = [fm.line_interface(mesh, e, fm.NodeIndices((k,))) for e, k in (("start", 0), ("mid", n // 2), ("end", n))]
+    mesh = fm.beams.straight_line((0, 0, 0), (LENGTH, 0, 0), n)
+    item = fm.beams.BeamProperty(SECTION, STEEL, orientation=(0, 1, 0), shear=False)
+    ends = [
+        fm.beams.line_interface(mesh, e, fm.beams.NodeIndices((k,)))
+        for e, k in (("start", 0), ("mid", n // 2), ("end", n))
+    ]
     body = cms.couple(fm.beam_body(mesh, item, name="beam", units=UNITS, interfaces=ends))
     options = {"n_axial": 3, "n_bending": n_modes, "n_torsion": 2, "axis": (1, 0, 0), "point": (0, 0, 0)}
-    return cms.reduce(body, cms.assumed_modes(body, **options), frame=frame, geometric=True)
+    return cms.reduce(body, cms.modes.assumed_modes(body, **options), frame=frame, geometric=True)
 
 
 def distances(body, fine):
@@ -86,7 +89,7 @@ def distances(body, fine):
 @pytest.mark.parametrize("frame", [cms.TisserandFrame(), cms.NodalFrame("start")], ids=["free", "clamped"])
 def test_a_mesh_of_beam_elements_converges_to_the_integrals_without_a_mesh(frame):
     """With h², that of the linear elements of tension and torsion."""
-    line = fm.beam_line(LENGTH, fm.BeamProperty(SECTION, STEEL, shear=False))
+    line = fm.beams.beam_line(LENGTH, fm.beams.BeamProperty(SECTION, STEEL, shear=False))
     body = made(line, 5, frame=frame, n_torsion=2, stations={"start": 0.0, "mid": 0.5, "end": LENGTH})
     coarse, fine = (fine_body(frame, 5, n) for n in (30, 90))
     assert body.n_q == fine.n_q
@@ -100,7 +103,7 @@ def test_a_mesh_of_beam_elements_converges_to_the_integrals_without_a_mesh(frame
 
 
 def test_mean_axes_carry_no_momentum_of_the_modes_and_the_mass_is_that_of_the_modes():
-    body = made(fm.beam_line(LENGTH, fm.BeamProperty(SECTION, STEEL)), 4)
+    body = made(fm.beams.beam_line(LENGTH, fm.beams.BeamProperty(SECTION, STEEL)), 4)
     moments = body.moments
     assert_allclose(moments.C1, 0, rtol=0, atol=1e-11)
     assert_allclose(moments.C2, 0, rtol=0, atol=1e-11)
@@ -108,21 +111,23 @@ def test_mean_axes_carry_no_momentum_of_the_modes_and_the_mass_is_that_of_the_mo
 
 
 def test_shear_gives_the_frequencies_of_the_timoshenko_beam():
-    item = fm.BeamProperty(fm.Rectangle(0.08, 0.1), STEEL)
-    body = made(fm.beam_line(LENGTH, item), 9, n_axial=4, n_torsion=4)
-    mesh = fm.straight_line((0, 0, 0), (LENGTH, 0, 0), 100)
+    item = fm.beams.BeamProperty(fm.beams.Rectangle(0.08, 0.1), STEEL)
+    body = made(fm.beams.beam_line(LENGTH, item), 9, n_axial=4, n_torsion=4)
+    mesh = fm.beams.straight_line((0, 0, 0), (LENGTH, 0, 0), 100)
     fine = cms.couple(
         fm.beam_body(
             mesh,
-            fm.BeamProperty(item.section, STEEL, orientation=(0, 1, 0)),
+            fm.beams.BeamProperty(item.section, STEEL, orientation=(0, 1, 0)),
             name="beam",
             units=UNITS,
-            interfaces=[fm.line_interface(mesh, "start", fm.NodeIndices((0,)))],
+            interfaces=[fm.beams.line_interface(mesh, "start", fm.beams.NodeIndices((0,)))],
         )
     )
-    full = cms.reduce(fine, cms.normal_modes(fine, n_modes=8)).free_frequencies
+    full = cms.reduce(fine, cms.modes.normal_modes(fine, n_modes=8)).free_frequencies
     assert_allclose(body.free_frequencies[:6], full[:6], rtol=4e-4)
-    stiff = made(fm.beam_line(LENGTH, fm.BeamProperty(item.section, STEEL, shear=False)), 9, n_axial=4, n_torsion=4)
+    stiff = made(
+        fm.beams.beam_line(LENGTH, fm.beams.BeamProperty(item.section, STEEL, shear=False)), 9, n_axial=4, n_torsion=4
+    )
     assert stiff.free_frequencies[2] > 1.02 * full[2]
 
 
@@ -132,7 +137,7 @@ def cone_line(d_start, d_end):
     A, inertia = np.pi / 4 * d**2, np.pi / 64 * d**4
     E, G = STEEL.E, STEEL.E / (2 * (1 + STEEL.nu))
     mass = STEEL.rho * inertia
-    return cms.BeamLine(
+    return fm.beams.BeamLine(
         LENGTH, STEEL.rho * A, E * A, E * inertia, E * inertia, 2 * G * inertia, rho_Iy=mass, rho_Iz=mass
     )
 
@@ -151,9 +156,9 @@ def test_tapered_cantilever_deflects_as_the_closed_form_says():
 
 def test_laws_of_sections_along_the_beam_are_those_of_the_polynomials():
     def section(x):
-        return fm.Circle((0.06 - 0.03 * x / LENGTH) / 2)
+        return fm.beams.Circle((0.06 - 0.03 * x / LENGTH) / 2)
 
-    line = fm.beam_line(LENGTH, fm.BeamProperty(section(0.0), STEEL, shear=False), taper=section)
+    line = fm.beams.beam_line(LENGTH, fm.beams.BeamProperty(section(0.0), STEEL, shear=False), taper=section)
     exact, x = cone_line(0.06, 0.03), np.linspace(0, LENGTH, 7)
     for name in ("rho_A", "EA", "EIy", "EIz", "GJ", "rho_Iy", "rho_Iz"):
         assert_allclose(line.at(name, x), exact.at(name, x), rtol=1e-12)
@@ -195,7 +200,7 @@ def test_a_nodal_frame_at_the_chord_holds_its_ends():
         ({"stations": {"tip": 1.5}}, BodyError, "station 'tip': expected a position in 0 .. 1"),
         ({"stations": {}}, BodyError, "at least one station"),
         ({"frame": cms.NodalFrame("stat")}, BodyError, "no station 'stat'"),
-        ({"frame": cms.BuckensFrame()}, BodyError, "no Buckens frame"),
+        ({"frame": cms.reduction.BuckensFrame()}, BodyError, "no Buckens frame"),
     ],
 )
 def test_bad_options_are_refused(options, error, text):
@@ -218,11 +223,11 @@ def test_impossible_laws_are_refused(changes, text):
 
 
 def test_a_section_beside_its_shear_centre_is_refused():
-    item = fm.BeamProperty(fm.GeneralSection(1e-3, 1e-7, 1e-7, 1e-8, shear_center=(0.01, 0.0)), STEEL)
-    with pytest.raises(fm.SectionError, match="shear centre"):
-        fm.beam_line(1.0, item)
-    with pytest.raises(fm.SectionError, match="offset and orientation"):
-        fm.beam_line(1.0, fm.BeamProperty(SECTION, STEEL, offset=(0.1, 0.0)))
+    item = fm.beams.BeamProperty(fm.beams.GeneralSection(1e-3, 1e-7, 1e-7, 1e-8, shear_center=(0.01, 0.0)), STEEL)
+    with pytest.raises(fm.errors.SectionError, match="shear centre"):
+        fm.beams.beam_line(1.0, item)
+    with pytest.raises(fm.errors.SectionError, match="offset and orientation"):
+        fm.beams.beam_line(1.0, fm.beams.BeamProperty(SECTION, STEEL, offset=(0.1, 0.0)))
 
 
 def test_a_pinned_column_buckles_at_the_load_of_euler():

@@ -22,7 +22,7 @@ COUNTED = (*((CORNERS[0], c) for c in (0, 1, 2)), (CORNERS[1], 1), (CORNERS[1], 
 def body():
     """A box whose nodes have numbers that go down, with gaps."""
     mesh = replace(MESH, node_numbers=9000 - 7 * np.arange(len(MESH.nodes)))
-    ends = [fm.NodeSet(name) for name in ("left", "right")]
+    ends = [fm.selections.NodeSet(name) for name in ("left", "right")]
     kept = [fm.rigid_interface(mesh, end.name, end) for end in ends]
     return cms.couple(solid_body(mesh, STEEL, name="box", units=cms.unit_system("m-kg-s"), interfaces=kept))
 
@@ -39,7 +39,7 @@ def test_numbers_and_counted_nodes_are_one_frame(body):
     assert_array_equal(numbered.frame.dofs, counted.frame.dofs)
     assert_array_equal(numbered.K, counted.K)
     mean = cms.reduce(body, modes, geometric=False)
-    turned = cms.convert_frame(mean, cms.NodalFrame(dofs=named(body)))
+    turned = cms.reduction.convert_frame(mean, cms.NodalFrame(dofs=named(body)))
     assert_array_equal(turned.frame.dofs, counted.frame.dofs)
 
 

@@ -60,13 +60,15 @@ def warped_shell():
     def surface(u, v):
         return np.stack([np.sin(1.2 * u), 0.3 * v + 0.1 * u * v, np.cos(1.2 * u) + 0.1 * v**2], axis=1)
 
-    mesh = fm.mapped_shell(surface, 4, 2, kind="quad")
+    mesh = fm.shells.mapped_shell(surface, 4, 2, kind="quad")
     ends = [
-        fm.shell_interface(mesh, "left", fm.NodeSet("u0"), reference=(0.0, 0.1, 1.05)),
-        fm.shell_interface(mesh, "right", fm.NodeSet("u1"), kind="distributing"),
+        fm.shells.shell_interface(mesh, "left", fm.selections.NodeSet("u0"), reference=(0.0, 0.1, 1.05)),
+        fm.shells.shell_interface(mesh, "right", fm.selections.NodeSet("u1"), kind="distributing"),
     ]
-    body = fm.shell_body(mesh, fm.ShellProperty(0.02, STEEL, offset=0.01), name="bar", units=SI, interfaces=ends)
-    return cms.couple(body.with_load_cases(fm.pressure_load(body, mesh, "push", fm.FaceGroup("shell"), 3.0)))
+    body = fm.shell_body(mesh, fm.shells.ShellProperty(0.02, STEEL, offset=0.01), name="bar", units=SI, interfaces=ends)
+    return cms.couple(
+        body.with_load_cases(fm.loads.pressure_load(body, mesh, "push", fm.selections.FaceGroup("shell"), 3.0))
+    )
 
 
 def welded_bar():
@@ -87,7 +89,7 @@ BODIES = {"beams": frame_of_beams, "shell": warped_shell, "welded": welded_bar}
 
 def reductions(body, names):
     """Return a coupled body reduced in some frames, from one mode set."""
-    with cms.Families(body) as families:
+    with cms.modes.Families(body) as families:
         modes = cms.craig_bampton(families, n_modes=5)
         return {name: cms.reduce(families, modes, frame=FRAMES[name], geometric=True) for name in names}
 
@@ -120,7 +122,7 @@ def assert_same(found, expected):
 @pytest.mark.parametrize("target", [name for name in FRAMES if name != "nodal"])
 @pytest.mark.parametrize("source", FRAMES)
 def test_converted_matrices_are_those_of_the_body_reduced_in_that_frame(made, source, target):
-    assert_same(cms.convert_frame(made[source], FRAMES[target]), made[target])
+    assert_same(cms.reduction.convert_frame(made[source], FRAMES[target]), made[target])
 
 
 @pytest.mark.parametrize("kind", BODIES)
@@ -129,14 +131,14 @@ def test_a_buckens_frame_and_back_for_every_kind_of_element(kind):
     made = reductions(BODIES[kind](), frames)
     buckens = made["buckens turned"]
     for name in frames:
-        assert_same(cms.convert_frame(made[name], FRAMES["buckens turned"]), buckens)
-        assert_same(cms.convert_frame(buckens, FRAMES[name]), made[name])
+        assert_same(cms.reduction.convert_frame(made[name], FRAMES["buckens turned"]), buckens)
+        assert_same(cms.reduction.convert_frame(buckens, FRAMES[name]), made[name])
 
 
 def test_a_buckens_frame_needs_no_matrices_of_its_reaction(made):
     """Converted to it they are zero, not rounding; in other frames they are there."""
     assert not made["buckens"].geometric.spread.K.any()
-    assert not cms.convert_frame(made["nodal left"], BuckensFrame()).geometric.spread.K.any()
+    assert not cms.reduction.convert_frame(made["nodal left"], BuckensFrame()).geometric.spread.K.any()
     assert made["tisserand"].geometric.spread.K.any()
 
 
@@ -147,12 +149,14 @@ def as_before_version_4(reduced):
 def test_a_reaction_that_is_not_on_record_is_refused(made):
     """One frame is held at dofs of several nodes; the other needs the spread loads."""
     with pytest.raises(BodyError, match=r"'bar': its geometric stiffness can .* whose reaction is no load at one"):
-        cms.convert_frame(made["tisserand"], NodalFrame())
+        cms.reduction.convert_frame(made["tisserand"], NodalFrame())
     with pytest.raises(BodyError, match=r"distributed over the nodes, is not stored .*reduce the body anew"):
-        cms.convert_frame(as_before_version_4(made["tisserand"]), BuckensFrame())
+        cms.reduction.convert_frame(as_before_version_4(made["tisserand"]), BuckensFrame())
     for target in (NodalFrame(), BuckensFrame()):
-        assert cms.convert_frame(replace(made["tisserand"], geometric=None), target).geometric is None
-    assert cms.convert_frame(as_before_version_4(made["tisserand"]), NodalFrame("left")).geometric.spread is None
+        assert cms.reduction.convert_frame(replace(made["tisserand"], geometric=None), target).geometric is None
+    assert (
+        cms.reduction.convert_frame(as_before_version_4(made["tisserand"]), NodalFrame("left")).geometric.spread is None
+    )
 
 
 def test_a_file_of_an_older_version_goes_where_it_went(made, caplog):
@@ -160,7 +164,10 @@ def test_a_file_of_an_older_version_goes_where_it_went(made, caplog):
     beams = reductions(frame_of_beams(), ("nodal left", "tisserand"))
     for bodies, source, target in ((made, "nodal right", "tisserand"), (made, "buckens", "nodal left"),
                                    (beams, "nodal left", "tisserand")):  # fmt: skip
-        found, expected = cms.convert_frame(as_before_version_4(bodies[source]), FRAMES[target]), bodies[target]
+        found, expected = (
+            cms.reduction.convert_frame(as_before_version_4(bodies[source]), FRAMES[target]),
+            bodies[target],
+        )
         sign = np.sign(np.einsum("nck,nck->k", expected.Phi, found.Phi))
         for name in UNIT_LOADS:
             K, K_expected = getattr(found.geometric, name), getattr(expected.geometric, name) * np.outer(sign, sign)
@@ -171,11 +178,11 @@ def test_a_file_of_an_older_version_goes_where_it_went(made, caplog):
 def test_coarse_shells_need_the_record(caplog):
     """Turned loads stand for it only as their cells get small: the fourth part of the largest entry is missed here."""
     made = reductions(warped_shell(), ("nodal left", "tisserand"))
-    cms.convert_frame(made["nodal left"], TisserandFrame())
+    cms.reduction.convert_frame(made["nodal left"], TisserandFrame())
     assert not caplog.text
-    found = cms.convert_frame(as_before_version_4(made["nodal left"]), TisserandFrame()).geometric.spin
+    found = cms.reduction.convert_frame(as_before_version_4(made["nodal left"]), TisserandFrame()).geometric.spin
     assert "from before version 4 and it has shells" in caplog.text
-    expected = cms.convert_frame(made["nodal left"], TisserandFrame()).geometric.spin
+    expected = cms.reduction.convert_frame(made["nodal left"], TisserandFrame()).geometric.spin
     assert np.abs(found - expected).max() > 0.25 * np.abs(expected).max()
 
 
@@ -235,7 +242,7 @@ def test_other_units_are_those_of_the_class():
     K = rng.standard_normal((6, 3, 3))
     spread = SpreadLoads(K + np.swapaxes(K, 1, 2), rng.standard_normal((6, 3, 3)), rng.standard_normal((6, 3, 3)))
     body = replace(body, geometric=GeometricStiffness(*arrays, turned, spread))
-    new = cms.convert_units(body, "in-slinch-s")
+    new = cms.body.convert_units(body, "in-slinch-s")
     expected = arrays_of(replace(new, geometric=body.geometric.in_units(body.units, new.units)))
     for name, value in arrays_of(new).items():
         assert_allclose(value, expected[name], rtol=1e-12, err_msg=name)

@@ -34,7 +34,7 @@ def test_a_rigid_rotation_turns_the_loads(name, frame):
     condition = frame_condition(body, frame)
     phi = np.random.default_rng(3).standard_normal((body.n_dof, 2))
     phi[body.dofs[:, 1] < 0] = 0.0  # no gap between a reference node and the mean of its members
-    with cms.Families(body) as families:
+    with cms.modes.Families(body) as families:
         phi = families.flexibility(phi)  # smooth shapes
         phi /= np.abs(phi).max()
         columns = np.hstack([rigid_motion_of_dofs(body.nodes, body.dofs), phi])
@@ -88,7 +88,7 @@ def bar_without_lateral_strain():
 def test_a_column_buckles_at_the_load_of_euler(make):
     body = cms.couple(make())
     EI = STEEL.E * 0.05 * 0.04**3 / 12
-    with cms.Families(body) as families:
+    with cms.modes.Families(body) as families:
         modes = cms.craig_bampton(families, n_modes=12)
         reduced = cms.reduce(families, modes, frame=NodalFrame(at="left"), geometric=True)
     push = critical(reduced.K, reduced.geometric.interfaces[1, 0])
@@ -129,7 +129,7 @@ def test_a_narrow_cantilever_tips_over_at_the_load_of_prandtl():
     properties = section.properties(STEEL.nu)
     EI, GJ = STEEL.E * min(properties.Iy, properties.Iz), STEEL.mu * properties.J
     stiff = int(np.argmax([properties.Iz, properties.Iy]))  # 0: strong for forces along y
-    with cms.Families(body) as families:
+    with cms.modes.Families(body) as families:
         modes = cms.craig_bampton(families, n_modes=30)
         reduced = cms.reduce(families, modes, frame=NodalFrame(at="left"), geometric=True)
     K_geo = reduced.geometric.interfaces[1, 1 + stiff]
@@ -140,7 +140,7 @@ def test_a_narrow_cantilever_tips_over_at_the_load_of_prandtl():
 def test_a_bent_cantilever_becomes_shorter(make):
     """A tip load bends it by w; its tip comes nearer by ∫ ½ w'² = 3/5 w²/L, which is ½ qᵀ K q of the unit force x."""
     body = cms.couple(make())
-    with cms.Families(body) as families:
+    with cms.modes.Families(body) as families:
         modes = cms.craig_bampton(families, n_modes=8)
         reduced = cms.reduce(families, modes, frame=NodalFrame(at="left"), geometric=True)
     Psi = reduced.interface("right").Psi
@@ -183,7 +183,7 @@ def test_a_spinning_cantilever_has_the_flap_frequencies_of_the_rotating_beam(spe
     body = cms.couple(bar_of_beams(30, L, section))
     EI, rho_A = STEEL.E * 0.004**4 / 12, STEEL.rho * 0.004**2
     unit = np.sqrt(EI / rho_A) / L**2
-    with cms.Families(body) as families:
+    with cms.modes.Families(body) as families:
         modes = cms.craig_bampton(families, n_modes=20)
         reduced = cms.reduce(families, modes, frame=NodalFrame(at="left"), geometric=True)
     Omega = speed * unit
@@ -205,7 +205,7 @@ def test_a_spinning_cantilever_of_solids_has_the_flap_frequency_of_the_rotating_
     material, h = replace(STEEL, nu=0.0), 0.02
     body = cms.couple(bar(20, 1, 1, width=h, height=h, kind=kind, material=material))
     unit = np.sqrt(STEEL.E * h**2 / 12 / STEEL.rho)
-    with cms.Families(body) as families:
+    with cms.modes.Families(body) as families:
         modes = cms.craig_bampton(families, n_modes=10)
         reduced = cms.reduce(families, modes, frame=NodalFrame(at="left"), geometric=True)
     Omega = 6.0 * unit
@@ -222,8 +222,8 @@ def test_solids_and_beams_agree():
     values = []
     for body in (bar(16, 1, 1, width=0.02, height=0.02), bar_of_beams(16, section=Rectangle(0.02, 0.02))):
         body = cms.couple(body)
-        with cms.Families(body) as families:
-            modes = cms.normal_modes(families, n_modes=4)
+        with cms.modes.Families(body) as families:
+            modes = cms.modes.normal_modes(families, n_modes=4)
             reduced = cms.reduce(families, modes, geometric=True)
         g = reduced.geometric
         values.append([np.linalg.eigvalsh(K) for K in (*g.spin[:3], g.interfaces[1, 0] - g.interfaces[0, 0])])
@@ -244,7 +244,7 @@ def test_the_support_does_not_matter_to_loads_in_balance():
     body = cms.couple(bar(3, 1, 1))
     Phi = np.random.default_rng(0).standard_normal((body.n_dof, 3))
     matrices = []
-    with cms.Families(body) as families:
+    with cms.modes.Families(body) as families:
         for frame in (TisserandFrame(), NodalFrame("left"), NodalFrame("right"), BuckensFrame()):
             g = reduced_geometric_stiffness(families, Phi, frame_condition(body, frame))
             matrices.append(g.interfaces[1, 0] - g.interfaces[0, 0])
@@ -257,7 +257,7 @@ def test_turned_axes_turn_the_matrices():
     body = cms.couple(bar(3, 1, 1))
     Phi = np.random.default_rng(0).standard_normal((body.n_dof, 2))
     axes = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))  # new x along y
-    with cms.Families(body) as families:
+    with cms.modes.Families(body) as families:
         old, new = (
             reduced_geometric_stiffness(families, Phi, frame_condition(body, frame))
             for frame in (NodalFrame("left"), NodalFrame("left", axes=axes))
@@ -286,7 +286,7 @@ def test_a_body_with_hardly_any_inertia_about_its_axis_is_stiffened_too():
     body = cms.couple(
         beam_body(mesh, BeamProperty(SECTION, massless), name="row", units=SI, interfaces=ends, point_masses=masses)
     )
-    reduced = cms.reduce(body, cms.guyan(body), frame=NodalFrame("left"), geometric=True)
+    reduced = cms.reduce(body, cms.modes.guyan(body), frame=NodalFrame("left"), geometric=True)
     EI = STEEL.E * 0.05 * 0.04**3 / 12
     assert critical(reduced.K, reduced.geometric.interfaces[1, 0]) > 0.99 * np.pi**2 * EI / 4
 
@@ -294,10 +294,10 @@ def test_a_body_with_hardly_any_inertia_about_its_axis_is_stiffened_too():
 def test_states_made_before_serve_when_the_factorisation_is_gone():
     body = cms.couple(bar(3, 1, 1))
     frame = NodalFrame("left")
-    with cms.Families(body) as families:
+    with cms.modes.Families(body) as families:
         modes = cms.craig_bampton(families, n_modes=2)
         expected = cms.reduce(families, modes, frame=frame, geometric=True).geometric
-        states = cms.unit_states(families, frame=frame)
+        states = cms.reduction.unit_states(families, frame=frame)
     found = cms.reduce(body, modes, geometric=states).geometric
     for name in ("translation", "rotation", "spin", "interfaces"):
         assert_array_equal(getattr(found, name), getattr(expected, name))
@@ -316,5 +316,5 @@ def test_bare_matrices_are_refused():
     )
     body = cms.couple(body)
     with pytest.raises(BodyError, match="'foreign': geometric stiffness needs the elements"):
-        cms.reduce(body, cms.guyan(body), geometric=True)
-    assert cms.reduce(body, cms.guyan(body)).geometric is None
+        cms.reduce(body, cms.modes.guyan(body), geometric=True)
+    assert cms.reduce(body, cms.modes.guyan(body)).geometric is None

@@ -34,7 +34,7 @@ def test_a_deformed_body_that_turns_is_a_deformed_body_that_is_turned(name, fram
     nodes = kept_nodes(body)
     phi = np.random.default_rng(3).standard_normal((body.n_dof, 1))
     phi[body.dofs[:, 1] < 0] = 0.0
-    with cms.Families(body) as families:
+    with cms.modes.Families(body) as families:
         phi = families.flexibility(phi)
         phi /= np.abs(phi).max()
         turns = rigid_motion_of_dofs(body.nodes, body.dofs)[:, 3:]
@@ -85,7 +85,7 @@ def test_the_field_fits_the_file_the_modes_and_the_rest():
     reduced = cms.reduce(body, cms.craig_bampton(body, n_modes=2), quadratic=True)
     assert reduced.geometric is not None
     assert_allclose(reduced.quadratic, np.swapaxes(reduced.quadratic, 2, 3), rtol=0, atol=1e-12)
-    in_mm = cms.convert_units(reduced, "mm-t-s")
+    in_mm = cms.body.convert_units(reduced, "mm-t-s")
     q = np.random.default_rng(0).standard_normal(reduced.n_q)
     p = np.sqrt(1e-3) * 1e3 * q  # mass^(1/2) length
     assert_allclose(

@@ -8,16 +8,19 @@ from tests.bodies import bar
 
 LENGTH, WIDTH, HEIGHT = 1.0, 0.05, 0.04
 NODES = (10, 31)
-STATIC_ROWS = (cms.Rows("stress", at=NODES), cms.Rows("strain", at=NODES[:1]))
+STATIC_ROWS = (cms.reduction.Rows("stress", at=NODES), cms.reduction.Rows("strain", at=NODES[:1]))
 POINT = (0.2, -0.3, 0.1)
 ROWS = (
     *STATIC_ROWS,
-    cms.Rows("displacement", at=("right", *NODES)),
-    cms.Rows("velocity", at=NODES[:1]),
-    cms.Rows("acceleration", at=("right", *NODES)),
-    cms.Rows("net force", about=POINT),
+    cms.reduction.Rows("displacement", at=("right", *NODES)),
+    cms.reduction.Rows("velocity", at=NODES[:1]),
+    cms.reduction.Rows("acceleration", at=("right", *NODES)),
+    cms.reduction.Rows("net force", about=POINT),
 )
-OF_INTERFACES = (cms.Rows("interface force"), cms.Rows("net force", at=("left", "right"), about=POINT))
+OF_INTERFACES = (
+    cms.reduction.Rows("interface force"),
+    cms.reduction.Rows("net force", at=("left", "right"), about=POINT),
+)
 
 
 @cache
@@ -29,7 +32,7 @@ def full() -> FEBody:
 def reduced(modes: str = "craig-bampton", frame: str = "tisserand") -> cms.ReducedBody:
     made = {
         "craig-bampton": lambda: cms.craig_bampton(full(), n_modes=4),
-        "normal": lambda: cms.normal_modes(full(), n_modes=8),
+        "normal": lambda: cms.modes.normal_modes(full(), n_modes=8),
     }[modes]()
     frames = {
         "tisserand": cms.TisserandFrame(),
@@ -37,5 +40,5 @@ def reduced(modes: str = "craig-bampton", frame: str = "tisserand") -> cms.Reduc
         "nodal": cms.NodalFrame("left"),
     }
     rows = (*ROWS, *(OF_INTERFACES if modes == "craig-bampton" else ()))
-    request = cms.RecoveryRequest("all", rows, loads_at=(20,))
-    return cms.reduce(full(), made, frame=frames[frame], recovery=request, damping=cms.ModalDamping(0.02))
+    request = cms.reduction.RecoveryRequest("all", rows, loads_at=(20,))
+    return cms.reduce(full(), made, frame=frames[frame], recovery=request, damping=cms.reduction.ModalDamping(0.02))

@@ -145,7 +145,7 @@ def test_rows_over_interfaces_say_the_same_of_a_free_motion():
     body = reduced("craig-bampton", "turned")
     table = body.recovery["all"]
     assert table.loads[-3:] == ("node index 20 fx", "node index 20 fy", "node index 20 fz")
-    matrices = cms.craig_bampton_matrices(body)
+    matrices = cms.reduction.craig_bampton_matrices(body)
     rows = matrices.recover(table)
     rng = np.random.default_rng(8)
     motion = [rng.standard_normal(len(matrices.M)) * 1e-3 for _ in range(3)]
@@ -179,7 +179,7 @@ def check_rows(body, matrices, rows, motion, p):
 def test_the_work_of_a_load_at_a_node_is_that_of_the_full_model():
     """Interface forces at rest, -Zᵀ G: their static rows are of the full model, G here of the nodes that are kept."""
     body = reduced("craig-bampton", "turned")
-    table, matrices = body.recovery["all"], cms.craig_bampton_matrices(body)
+    table, matrices = body.recovery["all"], cms.reduction.craig_bampton_matrices(body)
     names = table.loads[-3:]
     G = forces_of_loads(body, names)
     held = table.static[table.rows("interface force")][:, [table.loads.index(name) for name in names]]
@@ -189,16 +189,16 @@ def test_the_work_of_a_load_at_a_node_is_that_of_the_full_model():
 def test_loads_at_nodes_that_are_not_kept_are_refused():
     body = reduced("craig-bampton", "turned")
     table = body.recovery["all"]
-    lost = cms.RecoveryTable(**{**table.__dict__, "loads": (*table.loads[:-1], "node index 9999 fz")})
+    lost = cms.body.RecoveryTable(**{**table.__dict__, "loads": (*table.loads[:-1], "node index 9999 fz")})
     with pytest.raises(RecoveryError, match="load 'node index 9999 fz': its work on the modes is unknown"):
-        cms.craig_bampton_matrices(body).recover(lost)
+        cms.reduction.craig_bampton_matrices(body).recover(lost)
 
 
 def test_the_rigid_part_is_what_pyyeti_finds():
     """cbcheck: rigid-body mass, no force of the stiffness in a rigid motion, effective mass of the fixed modes."""
     cb = pytest.importorskip("pyyeti.cb")
     body = reduced("craig-bampton", "turned")
-    matrices = cms.craig_bampton_matrices(body)
+    matrices = cms.reduction.craig_bampton_matrices(body)
     left = matrices.rigid[:6]
     assert_allclose(left[:3, :3], np.eye(3), atol=0)
     places = np.array([full_place(body, name) for name in ("left", "right")])
@@ -244,7 +244,7 @@ def test_the_check_sees_rows_of_another_place_and_of_another_body(file, tmp_path
     dynamic = np.array(table.dynamic)
     dynamic[2, 0, 5] += 0.01
     dynamic[0, table.rows("beam force")[0], 1] = 1e6
-    wrong = cms.RecoveryTable(**{**table.__dict__, "dynamic": dynamic})
+    wrong = cms.body.RecoveryTable(**{**table.__dict__, "dynamic": dynamic})
     records = cms.check_body(cms.ReducedBody(**{**body.__dict__, "recovery": {"drm": wrong}}))
     names = {record.name: record.verdict for record in records}
     assert (names["recovery-motions"], names["recovery-forces"]) == ("fail", "fail")
@@ -268,7 +268,7 @@ def test_bad_rows_are_one_message(folder, new):
     old, words = BAD[new]
     assert JOB.count(old) == 1
     (folder / "bad.toml").write_text(JOB.replace(old, new))
-    with pytest.raises(cms.CmsError, match=words) as error:
+    with pytest.raises(cms.errors.CmsError, match=words) as error:
         cms.reduce_job(folder / "bad.toml")
     assert len(str(error.value).splitlines()) == 1
 
@@ -282,13 +282,13 @@ def test_bad_tables_and_files_are_refused(tmp_path):
         write_recovery(body, tmp_path / "x.csv", table="al")
     with pytest.raises(RecoveryError, match="move only"):
         write_recovery(reduced("normal", "turned"), tmp_path / "x.csv", over="interfaces")
-    with pytest.raises(cms.CmsError, match="the label"):
-        cms.RecoveryTable(**{**table.__dict__, "labels": (table.labels[0],) * table.n_rows})
-    with pytest.raises(cms.CmsError, match="dynamic"):
-        cms.RecoveryTable(**{**table.__dict__, "dynamic": table.dynamic[:2]})
-    with pytest.raises(cms.CmsError, match="loads: expected"):
+    with pytest.raises(cms.errors.CmsError, match="the label"):
+        cms.body.RecoveryTable(**{**table.__dict__, "labels": (table.labels[0],) * table.n_rows})
+    with pytest.raises(cms.errors.CmsError, match="dynamic"):
+        cms.body.RecoveryTable(**{**table.__dict__, "dynamic": table.dynamic[:2]})
+    with pytest.raises(cms.errors.CmsError, match="loads: expected"):
         table.values(np.zeros(6 + body.n_q), p=np.zeros(3))
-    with pytest.raises(cms.CmsError, match="no row 'node 3 velocty'"):
+    with pytest.raises(cms.errors.CmsError, match="no row 'node 3 velocty'"):
         table.rows("node 3 velocty")
     assert not list(tmp_path.iterdir())
 
@@ -297,7 +297,7 @@ def test_forces_of_a_driven_base_are_those_of_pyyeti():
     """Its frequency response of Craig-Bampton matrices on a moving boundary, beside our rows of the same motion."""
     cb = pytest.importorskip("pyyeti.cb")
     body = reduced("craig-bampton", "turned")
-    matrices = cms.craig_bampton_matrices(body)
+    matrices = cms.reduction.craig_bampton_matrices(body)
     rows = matrices.recover("all")
     n_b, frequencies = matrices.n_b, np.array([5.0, 60.0, 190.0, 400.0, 1500.0])
     motion = np.zeros((n_b, len(frequencies)))
@@ -310,5 +310,5 @@ def test_forces_of_a_driven_base_are_those_of_pyyeti():
     net = y[:, rows.table.rows("net force")[:6]]
     from tests.cms.reduction.recovery.examples import POINT
 
-    about = cms.craig_bampton_matrices(body, about=POINT).rigid
+    about = cms.reduction.craig_bampton_matrices(body, about=POINT).rigid
     assert_allclose(net, found.frc.T @ about, rtol=0, atol=1e-8 * np.abs(net).max())

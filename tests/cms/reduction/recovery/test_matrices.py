@@ -34,7 +34,7 @@ def stress_rows(body: FEBody, u):
     return body.element_model.nodal_stress(body.mesh_displacement(u))[list(NODES)].reshape(12, -1)
 
 
-def amounts(table: cms.RecoveryTable, **values):
+def amounts(table: cms.body.RecoveryTable, **values):
     """Return load amplitudes by name, blanks as underscores."""
     p = np.zeros(len(table.loads))
     for name, value in values.items():
@@ -122,7 +122,7 @@ def test_the_residual_response_is_static_in_mean_axes_without_the_modes():
 
 
 def test_tables_over_combinations_of_modes_are_those_over_modes_combined():
-    body, request = reduced("normal"), cms.RecoveryRequest("all", ROWS, loads_at=(20,))
+    body, request = reduced("normal"), cms.reduction.RecoveryRequest("all", ROWS, loads_at=(20,))
     Z = np.random.default_rng(8).normal(size=(body.n_q, 3))
     condition = frame_condition(full(), cms.TisserandFrame())
     with Families(full()) as families:
@@ -152,7 +152,7 @@ def test_a_steady_spin_has_the_stress_of_its_centrifugal_load(frame):
     exact = stress_rows(full(), supported(full(), F - full().M @ (Psi @ rigid)))[:, 0]
     p = np.zeros(len(table.loads))
     first = table.loads.index("spin xx")
-    p[first : first + 6] = cms.spin_products(A.T @ omega)
+    p[first : first + 6] = cms.body.spin_products(A.T @ omega)
     z, acceleration = statics(body, p)
     found = table.values(z, z_ddot=acceleration, p=p)[table.rows("stress")]
     assert_allclose(found, exact, rtol=0, atol=SOLVE * np.abs(exact).max())
@@ -175,7 +175,7 @@ def test_interface_forces_are_what_holds_the_full_motion_on_the_constraint_modes
     table = body.recovery["all"]
     modes = cms.craig_bampton(full(), n_modes=4)
     z, u = motion_of(body, modes)
-    with cms.Families(full()) as families:
+    with cms.modes.Families(full()) as families:
         Psi_C = families.Psi_C
     expected = Psi_C.T @ (full().M @ u[2] + full().K @ u[0])
     found = table.values(z[0], z_ddot=z[2])[table.rows("interface force")]
@@ -242,7 +242,7 @@ def test_a_spinning_body_has_the_acceleration_towards_its_axis():
     A, omega = body.frame.axes, np.array([3.0, -1.0, 2.0])
     p = np.zeros(len(table.loads))
     first = table.loads.index("spin xx")
-    p[first : first + 6] = cms.spin_products(A.T @ omega)
+    p[first : first + 6] = cms.body.spin_products(A.T @ omega)
     y = table.values(np.zeros(6 + body.n_q), p=p)
     c = full().nodes[NODES[0]] - body.frame.origin
     expected = np.cross(omega, np.cross(omega, c))
@@ -254,7 +254,7 @@ def test_loads_of_the_body_are_those_of_the_model(frame):
     """From the moments, and from mass matrix and element integrals."""
     body = reduced("craig-bampton", frame)
     own, forces = loads_of_body(body)
-    loads, F = loads_of_model(full(), body.frame, cms.RecoveryRequest("x", ROWS))
+    loads, F = loads_of_model(full(), body.frame, cms.reduction.RecoveryRequest("x", ROWS))
     assert own.names == loads.names
     modes = cms.craig_bampton(full(), n_modes=4)
     chosen = {"nodal": cms.NodalFrame("left")}.get(
@@ -282,7 +282,7 @@ def test_strain_is_the_compliance_times_stress():
 def test_rows_of_the_body_alone_are_those_of_the_model_without_their_static_part():
     body = reduced("craig-bampton", "turned")
     rows = tuple(row for row in ROWS if row.quantity != "strain")
-    alone = cms.recovery_matrices(body, cms.RecoveryRequest("all", rows))["all"]
+    alone = cms.reduction.recovery_matrices(body, cms.reduction.RecoveryRequest("all", rows))["all"]
     table = body.recovery["all"]
     same = [table.labels.index(label) for label in alone.labels]
     expected = table.of_rows(same)
@@ -293,7 +293,9 @@ def test_rows_of_the_body_alone_are_those_of_the_model_without_their_static_part
         scale = np.abs(expected.dynamic[order]).max(axis=1)[list(rows_of)][:, None] + 1e-300
         assert_allclose(a / scale, b / scale, rtol=0, atol=1e-8)
     with pytest.raises(RecoveryError, match="cannot provide it"):
-        cms.recovery_matrices(body, cms.RecoveryRequest("x", (cms.Rows("strain", at=NODES),)))
+        cms.reduction.recovery_matrices(
+            body, cms.reduction.RecoveryRequest("x", (cms.reduction.Rows("strain", at=NODES),))
+        )
 
 
 @pytest.mark.parametrize("target", ["nodal", "turned"])
@@ -369,10 +371,10 @@ def test_rows_go_through_the_modal_file_and_units(tmp_path):
 def test_the_static_part_brings_the_stress_of_a_shaken_body_to_that_of_the_full_model():
     """Both ends driven: what is left of the error is (f over the first mode left out)² of that without it, or less."""
     body = reduced("craig-bampton", "tisserand")
-    matrices = cms.craig_bampton_matrices(body)
+    matrices = cms.reduction.craig_bampton_matrices(body)
     table = body.recovery["all"]
     kept = [k for k, name in enumerate(table.loads) if not name.startswith("node ")]
-    table = cms.RecoveryTable(
+    table = cms.body.RecoveryTable(
         **{
             **table.__dict__,
             "loads": tuple(table.loads[k] for k in kept),
@@ -383,7 +385,7 @@ def test_the_static_part_brings_the_stress_of_a_shaken_body_to_that_of_the_full_
     rows, n_b = matrices.recover(table), matrices.n_b
     drive = matrices.rigid @ np.array([0.3, 0.2, 1.0, 0, 0, 0])
     b, i = full().b, full().i
-    with cms.Families(full()) as families:
+    with cms.modes.Families(full()) as families:
         left_out = families.fixed_modes(12).omega2[4] ** 0.5
     for share in (0.05, 0.2):
         omega2 = (share * left_out) ** 2

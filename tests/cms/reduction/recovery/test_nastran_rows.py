@@ -34,7 +34,7 @@ OF_A_BAR = {
 
 @cache
 def imported() -> cms.ReducedBody:
-    return cms.import_body(FILES, units="mm-kg-s")
+    return cms.exchange.import_body(FILES, units="mm-kg-s")
 
 
 @pytest.fixture(scope="module")
@@ -67,13 +67,15 @@ def rounded(frame) -> cms.ReducedBody:
 
 
 def reduced(body: cms.FEBody) -> cms.ReducedBody:
-    request = cms.RecoveryRequest("bars", (cms.Rows("beam force"), cms.Rows("displacement", at=(36, 43, 48))))
+    request = cms.reduction.RecoveryRequest(
+        "bars", (cms.reduction.Rows("beam force"), cms.reduction.Rows("displacement", at=(36, 43, 48)))
+    )
     return cms.reduce(body, cms.craig_bampton(body, n_modes=8), recovery=request, geometric=False)
 
 
 def boundary_rows(body: cms.ReducedBody, name: str):
     """Return label -> row over the 24 motions of the boundary in the order of Nastran's."""
-    matrices = cms.craig_bampton_matrices(body)
+    matrices = cms.reduction.craig_bampton_matrices(body)
     order = [matrices.boundary.index(f"node {n} {c}") for n in BOUNDARY for c in ("ux", "uy", "uz", "rx", "ry", "rz")]
     rows = matrices.recover(name)
     return {label: row[order] for label, row in zip(rows.table.labels, rows.displacement, strict=True)}
@@ -113,7 +115,7 @@ def test_rows_over_the_boundary_are_those_of_the_file():
     """The way through a floating frame and back: what stands in MEF1, by the boundary and by each mode but for sign."""
     raw = read_superelement(FILES)
     assert raw.forces is not None
-    matrices = cms.craig_bampton_matrices(imported())
+    matrices = cms.reduction.craig_bampton_matrices(imported())
     rows = matrices.recover("element forces")
     expected = raw.forces.matrix
     order = [matrices.boundary.index(f"node {n} {c}") for n in BOUNDARY for c in ("ux", "uy", "uz", "rx", "ry", "rz")]
@@ -149,7 +151,7 @@ def test_elements_and_entries_are_those_another_reader_finds():
     entries = np.array(words, dtype=int).reshape(-1, 4)
     table = imported().recovery["element forces"]
     np.testing.assert_array_equal(table.numbers, np.repeat(entries[:, 1], entries[:, 2]))
-    matrices = cms.craig_bampton_matrices(imported())
+    matrices = cms.reduction.craig_bampton_matrices(imported())
     rows = matrices.recover("element forces").displacement
     order = [
         matrices.boundary.index(f"node {n} {c}") for n in (3, 19, 27) for c in ("ux", "uy", "uz", "rx", "ry", "rz")

@@ -83,12 +83,12 @@ def test_moments_of_modes_are_those_of_the_mass_matrix():
 def test_invariants_agree_with_point_masses_over_the_cross_section():
     """Second road: the rod cut into point masses on a grid in x and over the rectangle, moved as rigid sections."""
     b, h, L, n = 0.2, 0.3, 0.7, 2
-    body = straight(n, fm.Rectangle(b, h), L)
+    body = straight(n, fm.beams.Rectangle(b, h), L)
     rng = np.random.default_rng(3)
     u = rng.normal(size=(body.n_dof, 2))
     xi, w = np.polynomial.legendre.leggauss(8)
     total = np.zeros((10, 10))
-    section = fm.Rectangle(b, h).properties(STEEL.nu)
+    section = fm.beams.Rectangle(b, h).properties(STEEL.nu)
     Phi_y = 12 * STEEL.E * section.Iz / (STEEL.mu * section.A_sy * (L / n) ** 2)
     Phi_z = 12 * STEEL.E * section.Iy / (STEEL.mu * section.A_sz * (L / n) ** 2)
     from fe_models.elements.beams.element import interpolation
@@ -110,7 +110,7 @@ def test_invariants_agree_with_point_masses_over_the_cross_section():
 
 def test_uniform_rod_has_its_closed_form_inertia():
     b, h, L = 0.2, 0.3, 2.0
-    body = straight(1, fm.Rectangle(b, h), L)
+    body = straight(1, fm.beams.Rectangle(b, h), L)
     moments = moments_from_gram(gram_of(body, np.zeros((body.n_dof, 1))))
     m = STEEL.rho * b * h * L
     assert_allclose(moments.m, m, rtol=1e-12)
@@ -120,12 +120,12 @@ def test_uniform_rod_has_its_closed_form_inertia():
 
 
 def test_a_turned_and_moved_frame_is_the_same_body():
-    mesh = fm.LineMesh([(0, 0, 0), (1, 0, 0), (1, 0.4, 0.7)], [(0, 1), (1, 2)])
+    mesh = fm.beams.LineMesh([(0, 0, 0), (1, 0, 0), (1, 0.4, 0.7)], [(0, 1), (1, 2)])
     R, d = Rotation.from_rotvec([0.4, -0.8, 0.5]).as_matrix(), np.array([3.0, -2.0, 1.0])
     v = np.array([(0.1, 1.0, 0.2), (0.3, 0.2, 1.0)])
-    item = fm.BeamProperty(fm.ISection(0.1, 0.2, 0.006, 0.01), STEEL, offset=(0.02, 0.05))
+    item = fm.beams.BeamProperty(fm.beams.ISection(0.1, 0.2, 0.006, 0.01), STEEL, offset=(0.02, 0.05))
     still = fm.beam_body(dataclasses.replace(mesh, orientations=v), item, name="a", units=SI)
-    turned_mesh = fm.LineMesh(mesh.nodes @ R.T + d, mesh.lines, orientations=v @ R.T)
+    turned_mesh = fm.beams.LineMesh(mesh.nodes @ R.T + d, mesh.lines, orientations=v @ R.T)
     turned = fm.beam_body(turned_mesh, item, name="b", units=SI)
     Q = np.kron(np.eye(6), R)  # nodal dofs of the turned body
     for still_matrix, turned_matrix in ((still.K, turned.K), (still.M, turned.M)):
@@ -141,7 +141,7 @@ def test_slender_beam_has_the_textbook_matrices_of_euler_and_bernoulli():
     """Second road: the cubic beam of the tests' own bodies, assembled densely."""
     E, G, A, Iy, Iz, J, rho = 2.1e11, 8.1e10, 1e-4, 1e-9, 2e-9, 3e-9, 7850.0
     material = fm.Material("steel", E=E, nu=E / (2 * G) - 1, rho=rho)
-    body = straight(8, fm.GeneralSection(A, Iy, Iz, J), material=material, shear=False, rotary_inertia=False)
+    body = straight(8, fm.beams.GeneralSection(A, Iy, Iz, J), material=material, shear=False, rotary_inertia=False)
     other = bodies.beam(8, E=E, G=G, A=A, Iy=Iy, Iz=Iz, J=J, rho=rho)
     assert_allclose(body.K.toarray(), other.K.toarray(), rtol=0, atol=ROUNDOFF * np.abs(other.K.data).max())
     assert_allclose(body.M.toarray(), other.M.toarray(), rtol=0, atol=ROUNDOFF * np.abs(other.M.data).max())
@@ -191,7 +191,7 @@ def pinned_timoshenko(k, EI, GA_s, rho, A, inertia, L):
 
 def test_timoshenko_frequencies_converge_from_above_with_the_second_power_of_the_length():
     """The static shapes leave out the shear deflection of the inertia load inside an element: h² in the frequency."""
-    shape, L = fm.Rectangle(0.2, 0.2), 1.0
+    shape, L = fm.beams.Rectangle(0.2, 0.2), 1.0
     section = shape.properties(0.3)
     exact = [
         pinned_timoshenko(k, STEEL.E * section.Iz, STEEL.mu * section.A_sy, STEEL.rho, section.A, section.Iz, L)
@@ -222,7 +222,7 @@ def clamped_free_timoshenko(EI, GA_s, rho, A, inertia, L, near):
 
 
 def test_clamped_deep_beam_has_the_frequencies_of_timoshenko():
-    shape, L, n = fm.Rectangle(0.1, 0.15), 1.0, 40
+    shape, L, n = fm.beams.Rectangle(0.1, 0.15), 1.0, 40
     section = shape.properties(0.3)
     found = supported_frequencies(straight(n, shape, L), np.arange(6), 2)
     for frequency, inertia, area in ((found[0], section.Iz, section.A_sy), (found[1], section.Iy, section.A_sz)):
@@ -240,7 +240,7 @@ def test_nafems_deep_simply_supported_beam():
     five_elements = np.array([42.710, 42.710, 71.495, 125.51, 150.76, 150.76, 221.57, 301.08, 301.08])
     material = fm.Material("steel", E=200e9, nu=0.3, rho=8000.0)
     for n, expected, rtol in ((5, five_elements, 1e-4), (40, closed, 1.5e-3)):
-        body = straight(n, fm.Rectangle(2.0, 2.0), 10.0, material=material)
+        body = straight(n, fm.beams.Rectangle(2.0, 2.0), 10.0, material=material)
         found = supported_frequencies(body, [0, 1, 2, 3, 6 * n + 1, 6 * n + 2], 9)
         assert_allclose(found, expected, rtol=rtol)
 
@@ -250,8 +250,8 @@ def test_nafems_cantilever_with_masses_beside_its_axis():
     closed = np.array([1.723, 1.727, 7.413, 9.972, 18.155, 26.957])
     material = fm.Material("steel", E=200e9, nu=0.3, rho=8000.0)
     n = 10
-    masses = [fm.PointMass(n, 10000.0, offset=(0, 2, 0)), fm.PointMass(n, 1000.0, offset=(0, -2, 0))]
-    body = straight(n, fm.Circle(0.25), 10.0, material=material, point_masses=masses, shear=False)
+    masses = [fm.beams.PointMass(n, 10000.0, offset=(0, 2, 0)), fm.beams.PointMass(n, 1000.0, offset=(0, -2, 0))]
+    body = straight(n, fm.beams.Circle(0.25), 10.0, material=material, point_masses=masses, shear=False)
     assert_allclose(supported_frequencies(body, np.arange(6), 6), closed, rtol=1.5e-3)
 
 
@@ -259,7 +259,7 @@ def test_beam_and_solid_bar_have_the_same_first_frequencies():
     """A slender solid bar of quadratic bricks lies within 1 % of the beam in bending, torsion apart by warping."""
     length, width, height = 1.0, 0.05, 0.07
     solid = bodies.bar(16, 2, 2, length, width, height, material=STEEL)
-    beam = straight(20, fm.Rectangle(width, height), length)
+    beam = straight(20, fm.beams.Rectangle(width, height), length)
     of_solid = np.sqrt(eigenmodes(solid.K, solid.M, n_modes=14).omega2[6:]) / (2 * np.pi)
     of_beam = supported_frequencies(beam, [], 14)[6:]
     assert_allclose(of_beam[:6], of_solid[:6], rtol=1e-2)
@@ -280,9 +280,9 @@ def static_solution(body, fixed, dof, force):
 @pytest.mark.parametrize(
     ("shape", "y", "z"),
     [
-        (fm.Rectangle(0.02, 0.03), 0.01, 0.015),
-        (fm.Tube(0.02, 0.003), 0.02, 0.02),
-        (fm.ISection(0.05, 0.08, 0.003, 0.004), 0.025, 0.04),
+        (fm.beams.Rectangle(0.02, 0.03), 0.01, 0.015),
+        (fm.beams.Tube(0.02, 0.003), 0.02, 0.02),
+        (fm.beams.ISection(0.05, 0.08, 0.003, 0.004), 0.025, 0.04),
     ],
 )
 def test_cantilever_shows_the_stress_of_its_section_forces_at_the_skin(shape, y, z):
@@ -301,7 +301,7 @@ def test_cantilever_shows_the_stress_of_its_section_forces_at_the_skin(shape, y,
 
 def test_torsion_of_a_tube_is_pure_shear_along_its_wall():
     radius = 0.02
-    shape = fm.Tube(radius, 0.003)
+    shape = fm.beams.Tube(radius, 0.003)
     body = straight(2, shape)
     u = static_solution(body, np.arange(6), 15, 1.0)
     stress = body.element_model.nodal_stress(body.mesh_displacement(u))[:, :, 0]
@@ -315,7 +315,7 @@ def test_torsion_of_a_tube_is_pure_shear_along_its_wall():
 
 def test_section_points_show_each_end_of_a_line_by_itself():
     """A force in the middle: the shear stress jumps there, and the mean of both is what the skin shows."""
-    body = fm.section_points(straight(2), [0, 1])
+    body = fm.beams.section_points(straight(2), [0, 1])
     u = static_solution(body, np.r_[0:6, 12:18], 7, 1.0)
     stress = body.stress_points.stress(body.mesh_displacement(u))[:, :, 0].reshape(2, 2, 8, 6)
     V = 0.5 / RECTANGLE.properties(0.3).A * 1.5
@@ -324,15 +324,15 @@ def test_section_points_show_each_end_of_a_line_by_itself():
     assert body.stress_points.names[8 + 3] == "line 0 end point 3"
     assert_allclose(body.stress_points.positions[8 + 3], [0.5, 0, 0.015], rtol=0, atol=1e-15)
     with pytest.raises(BeamError, match=r"expected lines 0\.\.1"):
-        fm.section_points(body, [2])
+        fm.beams.section_points(body, [2])
     with pytest.raises(BeamError, match="is not a frame"):
-        fm.section_points(bodies.bar(1, 1, 1), [0])
+        fm.beams.section_points(bodies.bar(1, 1, 1), [0])
 
 
 def test_stress_turns_with_the_frame():
     R = Rotation.from_rotvec([0.3, 0.9, -0.4]).as_matrix()
-    item = fm.BeamProperty(RECTANGLE, STEEL, orientation=tuple(R[:, 1]))
-    along = fm.straight_line((0, 0, 0), R[:, 0], 2)
+    item = fm.beams.BeamProperty(RECTANGLE, STEEL, orientation=tuple(R[:, 1]))
+    along = fm.beams.straight_line((0, 0, 0), R[:, 0], 2)
     turned = fm.beam_body(along, item, name="b", units=SI)
     still = straight(2)
     u = static_solution(still, np.arange(6), 13, 1.0)
@@ -352,9 +352,9 @@ def test_portal_frame_sways_as_the_slope_deflection_method_says():
     h, width, P = 3.0, 4.0, 1.0
     I_c, I_b, big = 2e-5, 5e-5, 1e4
     nodes = [(0, 0, 0), (0, 0, h), (width, 0, h), (width, 0, 0)]
-    mesh = fm.LineMesh(nodes, [(0, 1), (1, 2), (2, 3)], line_sets={"column": [0, 2], "beam": [1]})
+    mesh = fm.beams.LineMesh(nodes, [(0, 1), (1, 2), (2, 3)], line_sets={"column": [0, 2], "beam": [1]})
     made = {
-        name: fm.BeamProperty(fm.GeneralSection(big, inertia, inertia, inertia), STEEL)
+        name: fm.beams.BeamProperty(fm.beams.GeneralSection(big, inertia, inertia, inertia), STEEL)
         for name, inertia in (("column", I_c), ("beam", I_b))
     }
     body = fm.beam_body(mesh, made, name="portal", units=SI)
@@ -372,7 +372,7 @@ def test_portal_frame_sways_as_the_slope_deflection_method_says():
 
 def test_height_stands_upright_by_default():
     """Without orientation z points up, so a slender upright rectangle is stiff against its weight."""
-    body = straight(1, fm.Rectangle(0.01, 0.1))
+    body = straight(1, fm.beams.Rectangle(0.01, 0.1))
     u_y, u_z = (static_solution(body, np.arange(6), dof, 1.0)[dof, 0] for dof in (7, 8))
     assert u_y > 50 * u_z
 
@@ -380,14 +380,14 @@ def test_height_stands_upright_by_default():
 def test_offset_line_is_the_line_at_its_place_with_rigid_arms():
     """A line on nodes beside it equals the line on its own nodes, which follow the others."""
     arm = np.array([0.0, 0.1, -0.2])
-    mesh = fm.straight_line((0, 0, 0), (1, 0, 0), 3)
-    item = fm.BeamProperty(RECTANGLE, STEEL)
-    offset = fm.LineMesh(mesh.nodes, mesh.lines, offsets=np.tile(arm, (3, 2, 1)))
+    mesh = fm.beams.straight_line((0, 0, 0), (1, 0, 0), 3)
+    item = fm.beams.BeamProperty(RECTANGLE, STEEL)
+    offset = fm.beams.LineMesh(mesh.nodes, mesh.lines, offsets=np.tile(arm, (3, 2, 1)))
     one = fm.beam_body(offset, item, name="one", units=SI)
-    both = fm.LineMesh(np.vstack([mesh.nodes, mesh.nodes + arm]), mesh.lines + 4)
-    links = [fm.RigidLink(k, (k + 4,)) for k in range(4)]
+    both = fm.beams.LineMesh(np.vstack([mesh.nodes, mesh.nodes + arm]), mesh.lines + 4)
+    links = [fm.beams.RigidLink(k, (k + 4,)) for k in range(4)]
     other = fm.beam_body(both, item, name="other", units=SI, links=links)
-    section_offset = fm.BeamProperty(RECTANGLE, STEEL, offset=(0.1, -0.2))
+    section_offset = fm.beams.BeamProperty(RECTANGLE, STEEL, offset=(0.1, -0.2))
     third = fm.beam_body(mesh, section_offset, name="third", units=SI)
     for body in (other, third):
         assert_allclose(body.K.toarray(), one.K.toarray(), rtol=0, atol=ROUNDOFF * np.abs(one.K.data).max())
@@ -398,9 +398,9 @@ def test_a_point_mass_has_the_inertia_it_was_given():
     """Parallel axes: about the node J + m (d² 1 - d dᵀ)."""
     J = np.array([[3.0, 0.2, 0.1], [0.2, 2.0, -0.3], [0.1, -0.3, 4.0]])
     d = np.array([0.3, -0.2, 0.5])
-    mesh = fm.LineMesh([(0, 0, 0), (1, 0, 0)], np.zeros((0, 2), int))
-    spring = fm.Spring((0, 1), np.ones(6))
-    masses = [fm.PointMass(0, 2.0, J, d), fm.PointMass(1, 1.0, 1.0)]
+    mesh = fm.beams.LineMesh([(0, 0, 0), (1, 0, 0)], np.zeros((0, 2), int))
+    spring = fm.beams.Spring((0, 1), np.ones(6))
+    masses = [fm.beams.PointMass(0, 2.0, J, d), fm.beams.PointMass(1, 1.0, 1.0)]
     M = fm.beam_body(mesh, {}, name="mass", units=SI, point_masses=masses, springs=[spring]).M.toarray()[:6, :6]
     skew = np.array([[0, -d[2], d[1]], [d[2], 0, -d[0]], [-d[1], d[0], 0]])
     expected = np.block([[2 * np.eye(3), -2 * skew], [2 * skew, J - 2 * skew @ skew]])
@@ -408,7 +408,7 @@ def test_a_point_mass_has_the_inertia_it_was_given():
 
 
 def test_both_shear_areas_act_in_their_own_plane():
-    shape = fm.ISection(0.1, 0.2, 0.006, 0.01)
+    shape = fm.beams.ISection(0.1, 0.2, 0.006, 0.01)
     section = shape.properties(0.3)
     body = straight(1, shape, 0.5)
     for dof, inertia, area in ((7, section.Iz, section.A_sy), (8, section.Iy, section.A_sz)):
@@ -421,7 +421,7 @@ class Eccentric:
     """A tube whose shear centre is said to lie elsewhere."""
 
     def properties(self, nu):
-        return dataclasses.replace(fm.Tube(0.02, 0.003).properties(nu), shear_center=(0.03, -0.01))
+        return dataclasses.replace(fm.beams.Tube(0.02, 0.003).properties(nu), shear_center=(0.03, -0.01))
 
 
 def test_torsion_stress_is_that_about_the_shear_center():
@@ -439,13 +439,13 @@ def test_torsion_stress_is_that_about_the_shear_center():
 
 def test_links_of_links_follow_the_first_leader():
     nodes = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 1)]
-    mesh = fm.LineMesh(nodes, [(0, 1)])
-    masses = [fm.PointMass(3, 2.0, 0.3)]
-    item = fm.BeamProperty(RECTANGLE, STEEL)
-    chain = [fm.RigidLink(1, (2,)), fm.RigidLink(2, (3,))]
+    mesh = fm.beams.LineMesh(nodes, [(0, 1)])
+    masses = [fm.beams.PointMass(3, 2.0, 0.3)]
+    item = fm.beams.BeamProperty(RECTANGLE, STEEL)
+    chain = [fm.beams.RigidLink(1, (2,)), fm.beams.RigidLink(2, (3,))]
     body = fm.beam_body(mesh, item, name="chain", units=SI, point_masses=masses, links=chain)
-    direct = [fm.PointMass(1, 2.0, 0.3, offset=(0, 1, 1))]
-    short = fm.beam_body(fm.LineMesh(nodes[:2], [(0, 1)]), item, name="short", units=SI, point_masses=direct)
+    direct = [fm.beams.PointMass(1, 2.0, 0.3, offset=(0, 1, 1))]
+    short = fm.beam_body(fm.beams.LineMesh(nodes[:2], [(0, 1)]), item, name="short", units=SI, point_masses=direct)
     assert_allclose(body.M.toarray(), short.M.toarray(), rtol=0, atol=ROUNDOFF * np.abs(short.M.data).max())
     moved = body.translations(np.eye(body.n_dof)[:, 6:])[3]
     assert_allclose(moved[:, 3], [0, -1, 1], rtol=0, atol=0)  # e_x × (0, 1, 1)
@@ -453,9 +453,9 @@ def test_links_of_links_follow_the_first_leader():
 
 def test_two_masses_on_a_spring_swing_at_their_frequency():
     """omega² = k (1/m1 + 1/m2); a body without any line."""
-    mesh = fm.LineMesh([(0, 0, 0), (1, 0, 0)], np.zeros((0, 2), int))
-    masses = [fm.PointMass(0, 2.0, 0.1), fm.PointMass(1, 3.0, 0.1)]
-    spring = fm.Spring((0, 1), [1000.0, 0, 0, 0, 0, 0])
+    mesh = fm.beams.LineMesh([(0, 0, 0), (1, 0, 0)], np.zeros((0, 2), int))
+    masses = [fm.beams.PointMass(0, 2.0, 0.1), fm.beams.PointMass(1, 3.0, 0.1)]
+    spring = fm.beams.Spring((0, 1), [1000.0, 0, 0, 0, 0, 0])
     body = fm.beam_body(mesh, {}, name="two masses", units=SI, point_masses=masses, springs=[spring])
     found = supported_frequencies(body, [], 12)[-1]
     assert_allclose(found, np.sqrt(1000 * (1 / 2 + 1 / 3)) / (2 * np.pi), rtol=1e-12)
@@ -466,7 +466,7 @@ def test_a_straight_beam_has_a_buckens_frame():
     body = cms.couple(straight(6, interfaces=("start", "end")))
     assert_allclose(body.node_volumes.sum(), RECTANGLE.properties(0.3).A, rtol=1e-12)
     assert_allclose(body.node_volumes @ body.nodes / body.node_volumes.sum(), [0.5, 0, 0], rtol=0, atol=1e-12)
-    reduced = cms.reduce(body, cms.craig_bampton(body, n_modes=4), frame=cms.BuckensFrame())
+    reduced = cms.reduce(body, cms.craig_bampton(body, n_modes=4), frame=cms.reduction.BuckensFrame())
     tisserand = cms.reduce(body, cms.craig_bampton(body, n_modes=4))
     assert_allclose(reduced.free_frequencies, tisserand.free_frequencies, rtol=1e-8)
 
@@ -474,9 +474,9 @@ def test_a_straight_beam_has_a_buckens_frame():
 def test_skin_is_closed_and_points_outward():
     """Every edge belongs to two triangles, and the enclosed volume is A L."""
     for shape in (
-        fm.Rectangle(0.02, 0.03),
-        fm.BoxSection(0.05, 0.08, 0.004, 0.006),
-        fm.ISection(0.1, 0.2, 0.006, 0.01),
+        fm.beams.Rectangle(0.02, 0.03),
+        fm.beams.BoxSection(0.05, 0.08, 0.004, 0.006),
+        fm.beams.ISection(0.1, 0.2, 0.006, 0.01),
     ):
         body = straight(3, shape)
         edges = np.concatenate([body.surface[:, [0, 1]], body.surface[:, [1, 2]], body.surface[:, [2, 0]]])
@@ -492,24 +492,36 @@ def test_skin_is_closed_and_points_outward():
 
 
 def corner(**options):
-    return fm.LineMesh([(0, 0, 0), (1, 0, 0), (1, 1, 0)], [(0, 1), (1, 2)], **options)
+    return fm.beams.LineMesh([(0, 0, 0), (1, 0, 0), (1, 1, 0)], [(0, 1), (1, 2)], **options)
 
 
 BAD = [
-    (lambda: fm.LineMesh([(0, 0, 0)], [(0, 1)]), BeamError, "lines: expected 0..0, got 0..1"),
-    (lambda: fm.LineMesh([(0, 0, np.nan)], []), BeamError, "finite coordinates"),
-    (lambda: made(fm.LineMesh([(0, 0, 0), (0, 0, 0)], [(0, 1)])), BeamError, "1 lines have no length"),
+    (lambda: fm.beams.LineMesh([(0, 0, 0)], [(0, 1)]), BeamError, "lines: expected 0..0, got 0..1"),
+    (lambda: fm.beams.LineMesh([(0, 0, np.nan)], []), BeamError, "finite coordinates"),
+    (lambda: made(fm.beams.LineMesh([(0, 0, 0), (0, 0, 0)], [(0, 1)])), BeamError, "1 lines have no length"),
     (lambda: made(corner(orientations=[(1, 0, 0), (0, 0, 1)])), BeamError, "along the line"),
-    (lambda: made(fm.LineMesh([(0, 0, 0), (1, 0, 0), (2, 0, 0)], [(0, 1)])), BeamError, "1 nodes belong to no line"),
-    (lambda: made(corner(), links=[fm.RigidLink(0, (2,)), fm.RigidLink(1, (2,))]), BeamError, "follows two nodes"),
-    (lambda: made(corner(), links=[fm.RigidLink(0, (2,)), fm.RigidLink(2, (0,))]), BeamError, "follows itself"),
-    (lambda: fm.RigidLink(1, (1,)), BeamError, "other nodes that follow"),
-    (lambda: made(corner(), point_masses=[fm.PointMass(7, 1.0)]), BeamError, "node 7 does not exist"),
-    (lambda: fm.PointMass(0, -1.0), BeamError, "a mass of zero or more"),
-    (lambda: fm.PointMass(0, 1.0, -np.eye(3)), BeamError, "without negative principal values"),
-    (lambda: fm.Spring((1, 1), np.ones(6)), BeamError, "expected two nodes"),
-    (lambda: fm.Spring((0, 1), -np.ones(6)), BeamError, "without negative eigenvalues"),
-    (lambda: fm.Spring((0, 1), np.ones(5)), BeamError, "six numbers"),
+    (
+        lambda: made(fm.beams.LineMesh([(0, 0, 0), (1, 0, 0), (2, 0, 0)], [(0, 1)])),
+        BeamError,
+        "1 nodes belong to no line",
+    ),
+    (
+        lambda: made(corner(), links=[fm.beams.RigidLink(0, (2,)), fm.beams.RigidLink(1, (2,))]),
+        BeamError,
+        "follows two nodes",
+    ),
+    (
+        lambda: made(corner(), links=[fm.beams.RigidLink(0, (2,)), fm.beams.RigidLink(2, (0,))]),
+        BeamError,
+        "follows itself",
+    ),
+    (lambda: fm.beams.RigidLink(1, (1,)), BeamError, "other nodes that follow"),
+    (lambda: made(corner(), point_masses=[fm.beams.PointMass(7, 1.0)]), BeamError, "node 7 does not exist"),
+    (lambda: fm.beams.PointMass(0, -1.0), BeamError, "a mass of zero or more"),
+    (lambda: fm.beams.PointMass(0, 1.0, -np.eye(3)), BeamError, "without negative principal values"),
+    (lambda: fm.beams.Spring((1, 1), np.ones(6)), BeamError, "expected two nodes"),
+    (lambda: fm.beams.Spring((0, 1), -np.ones(6)), BeamError, "without negative eigenvalues"),
+    (lambda: fm.beams.Spring((0, 1), np.ones(5)), BeamError, "six numbers"),
     (
         lambda: fm.beam_body(corner(line_sets={"leg": [0]}), {"leg": item()}, name="b", units=SI),
         SectionError,
@@ -526,7 +538,7 @@ BAD = [
         "1 lines of group 'b' have two",
     ),
     (
-        lambda: fm.BeamProperty(RECTANGLE, STEEL, offset=(1.0, np.nan)),
+        lambda: fm.beams.BeamProperty(RECTANGLE, STEEL, offset=(1.0, np.nan)),
         SectionError,
         "offset: expected 2 finite numbers",
     ),
@@ -534,7 +546,7 @@ BAD = [
 
 
 def item():
-    return fm.BeamProperty(RECTANGLE, STEEL)
+    return fm.beams.BeamProperty(RECTANGLE, STEEL)
 
 
 def made(mesh, **attached):
@@ -549,7 +561,7 @@ def test_bad_input_is_refused_with_one_message(make, error, words):
 
 def test_an_interface_cannot_take_a_node_that_follows():
     mesh = corner()
-    end = fm.line_interface(mesh, "end", fm.NodeIndices((2,)))
-    body = made(mesh, interfaces=[end], links=[fm.RigidLink(1, (2,))])
+    end = fm.beams.line_interface(mesh, "end", fm.beams.NodeIndices((2,)))
+    body = made(mesh, interfaces=[end], links=[fm.beams.RigidLink(1, (2,))])
     with pytest.raises(BodyError, match="follow a rigid link"):
         cms.couple(body)

@@ -11,11 +11,11 @@ from fe_models.errors import SectionError
 
 NU = 0.3
 SHAPES = [
-    fm.Circle(0.03),
-    fm.Tube(0.03, 0.004),
-    fm.Rectangle(0.03, 0.05),
-    fm.BoxSection(0.05, 0.08, 0.004, 0.006),
-    fm.ISection(0.1, 0.2, 0.006, 0.01),
+    fm.beams.Circle(0.03),
+    fm.beams.Tube(0.03, 0.004),
+    fm.beams.Rectangle(0.03, 0.05),
+    fm.beams.BoxSection(0.05, 0.08, 0.004, 0.006),
+    fm.beams.ISection(0.1, 0.2, 0.006, 0.01),
 ]
 SECTION_IDS = [type(shape).__name__ for shape in SHAPES]
 
@@ -43,7 +43,7 @@ def polygon_moments(section):
 def test_outline_has_the_area_and_second_moments_of_the_section(shape):
     section = shape.properties(NU)
     A, Iy, Iz, Iyz = polygon_moments(section)
-    is_round = isinstance(shape, fm.Circle | fm.Tube)
+    is_round = isinstance(shape, fm.beams.Circle | fm.beams.Tube)
     # a polygon of n corners in a circle: A falls by sinc(2 pi/n), I by sinc(2 pi/n) (2 + cos(2 pi/n)) / 3
     sinc, cos = np.sinc(2 / 16), np.cos(2 * np.pi / 16)
     area_share, inertia_share = (sinc, sinc * (2 + cos) / 3) if is_round else (1.0, 1.0)
@@ -110,7 +110,7 @@ def test_torsion_of_a_rectangle_has_the_tabulated_values():
 
 
 def test_round_sections_twist_by_their_polar_moment():
-    for shape, r_i in ((fm.Circle(0.03), 0.0), (fm.Tube(0.03, 0.004), 0.026)):
+    for shape, r_i in ((fm.beams.Circle(0.03), 0.0), (fm.beams.Tube(0.03, 0.004), 0.026)):
         section = shape.properties(NU)
         assert_allclose(section.J, np.pi / 2 * (0.03**4 - r_i**4), rtol=1e-12)
         tau = np.linalg.norm(section.stress[:16, 1:, 3], axis=1)
@@ -143,19 +143,19 @@ def test_shear_coefficients_of_thin_walls_are_those_of_the_flow_energy_without_p
 
 
 def test_shear_coefficients_have_their_closed_forms_and_limits():
-    circle, rectangle = fm.Circle(1.0).properties(NU), fm.Rectangle(1.0, 2.0).properties(NU)
+    circle, rectangle = fm.beams.Circle(1.0).properties(NU), fm.beams.Rectangle(1.0, 2.0).properties(NU)
     assert_allclose(circle.A_sy / circle.A, 6 * 1.3 / (7 + 1.8), rtol=1e-12)
     assert_allclose(rectangle.A_sz / rectangle.A, 13 / 15.3, rtol=1e-12)
-    nearly_solid = fm.Tube(1.0, 1 - 1e-6).properties(NU)
+    nearly_solid = fm.beams.Tube(1.0, 1 - 1e-6).properties(NU)
     assert_allclose(nearly_solid.A_sy / nearly_solid.A, 6 * 1.3 / (7 + 1.8), rtol=1e-9)
-    thin = fm.Tube(1.0, 1e-6).properties(NU)
+    thin = fm.beams.Tube(1.0, 1e-6).properties(NU)
     assert_allclose(thin.A_sy / thin.A, 2 * 1.3 / (4 + 0.9), rtol=1e-5)
     no_flange = i_shear_coefficient(1.0, 0.1, 1e-9, 1e-9, NU)  # only the web is left: a rectangle
     assert_allclose(no_flange, 13 / 15.3, rtol=1e-6)
 
 
 def test_general_section_draws_the_rectangle_of_its_moments():
-    section = fm.GeneralSection(A=0.002, Iy=0.002 * 0.05**2 / 12, Iz=0.002 * 0.04**2 / 12, J=1e-7).properties(NU)
+    section = fm.beams.GeneralSection(A=0.002, Iy=0.002 * 0.05**2 / 12, Iz=0.002 * 0.04**2 / 12, J=1e-7).properties(NU)
     assert_allclose(np.ptp(section.points, axis=0), [0.04, 0.05], rtol=1e-12)
     assert np.isinf(section.A_sy)
 
@@ -165,19 +165,19 @@ def test_polygons_that_are_not_simple_are_refused():
     with pytest.raises(SectionError, match="simple polygon"):
         triangulate_polygon(bow_tie)
     with pytest.raises(SectionError, match="anticlockwise"):
-        fm.GeneralSection(1.0, 1.0, 1.0, 1.0, outline=np.array([(0, 0), (0, 1), (1, 1), (1, 0.0)])).properties(NU)
+        fm.beams.GeneralSection(1.0, 1.0, 1.0, 1.0, outline=np.array([(0, 0), (0, 1), (1, 1), (1, 0.0)])).properties(NU)
 
 
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: fm.Circle(0.0), "radius: expected a length above zero"),
-        (lambda: fm.Circle(float("nan")), "radius: expected a length above zero"),
-        (lambda: fm.Tube(0.02, 0.02), "leaves no hole"),
-        (lambda: fm.BoxSection(0.05, 0.05, 0.03, 0.004), "leave no hole"),
-        (lambda: fm.ISection(0.05, 0.05, 0.004, 0.03), "fill the outline"),
-        (lambda: fm.GeneralSection(1.0, 1.0, 0.0, 1.0).properties(NU), "Iz above zero"),
-        (lambda: fm.GeneralSection(1.0, 1.0, 1.0, -1.0).properties(NU), "J: expected a number above zero"),
+        (lambda: fm.beams.Circle(0.0), "radius: expected a length above zero"),
+        (lambda: fm.beams.Circle(float("nan")), "radius: expected a length above zero"),
+        (lambda: fm.beams.Tube(0.02, 0.02), "leaves no hole"),
+        (lambda: fm.beams.BoxSection(0.05, 0.05, 0.03, 0.004), "leave no hole"),
+        (lambda: fm.beams.ISection(0.05, 0.05, 0.004, 0.03), "fill the outline"),
+        (lambda: fm.beams.GeneralSection(1.0, 1.0, 0.0, 1.0).properties(NU), "Iz above zero"),
+        (lambda: fm.beams.GeneralSection(1.0, 1.0, 1.0, -1.0).properties(NU), "J: expected a number above zero"),
     ],
 )
 def test_impossible_sections_are_refused(make, words):
@@ -191,7 +191,7 @@ def warping_torsion_constant(shape, n):
     from skfem.helpers import dot, grad
 
     b, h, web, flange = shape.width, shape.height, shape.web, shape.flange
-    is_box = isinstance(shape, fm.BoxSection)
+    is_box = isinstance(shape, fm.beams.BoxSection)
 
     def cuts(*edges):
         parts = [np.linspace(lo, hi, n + 1) for lo, hi in pairwise(edges)]
@@ -220,10 +220,10 @@ def warping_torsion_constant(shape, n):
 @pytest.mark.parametrize(
     ("shape", "bound"),
     [
-        (fm.BoxSection(0.05, 0.08, 0.004, 0.006), 0.035),
-        (fm.BoxSection(0.1, 0.1, 0.005, 0.005), 0.025),
-        (fm.ISection(0.1, 0.2, 0.0056, 0.0085), 0.07),
-        (fm.ISection(0.2, 0.2, 0.009, 0.015), 0.05),
+        (fm.beams.BoxSection(0.05, 0.08, 0.004, 0.006), 0.035),
+        (fm.beams.BoxSection(0.1, 0.1, 0.005, 0.005), 0.025),
+        (fm.beams.ISection(0.1, 0.2, 0.0056, 0.0085), 0.07),
+        (fm.beams.ISection(0.2, 0.2, 0.009, 0.015), 0.05),
     ],
 )
 def test_torsion_constants_of_walls_lie_within_a_few_percent_of_the_solved_warping(shape, bound):
@@ -237,7 +237,7 @@ def test_shear_stress_turns_with_the_torque_and_points_along_the_force(shape):
     y, z = section.points.T
     tau = section.stress[:, 1:]
     moment = y * tau[:, 1, 3] - z * tau[:, 0, 3]  # of a unit torque about x
-    if isinstance(shape, fm.ISection):  # the inner faces of the flanges run back
+    if isinstance(shape, fm.beams.ISection):  # the inner faces of the flanges run back
         moment = moment[np.abs(np.abs(z) - shape.height / 2) < 1e-12]
     assert (moment >= 0).all()
     assert (moment > 0).any()
@@ -248,7 +248,7 @@ def test_shear_stress_turns_with_the_torque_and_points_along_the_force(shape):
 
 
 def test_a_box_turned_by_a_right_angle_has_its_stresses_exchanged():
-    upright, lying = fm.BoxSection(0.05, 0.08, 0.004, 0.006), fm.BoxSection(0.08, 0.05, 0.006, 0.004)
+    upright, lying = fm.beams.BoxSection(0.05, 0.08, 0.004, 0.006), fm.beams.BoxSection(0.08, 0.05, 0.006, 0.004)
     a, b = upright.properties(NU), lying.properties(NU)
     assert_allclose([a.A_sy, a.A_sz, a.Iy, a.J], [b.A_sz, b.A_sy, b.Iz, b.J], rtol=1e-12)
     side, top = 1, 3  # middles of the walls y = b/2 and z = h/2

@@ -20,7 +20,10 @@ def plate() -> fm.FEBody:
     nodes = np.stack([x.ravel(), y.ravel(), np.zeros(9)], axis=1)
     quads = np.array([[0, 3, 4, 1], [1, 4, 5, 2], [3, 6, 7, 4], [4, 7, 8, 5]])
     return fm.shell_body(
-        fm.ShellMesh(nodes, {"quad": quads}), fm.ShellProperty(T, STEEL), name="plate", units=unit_system("m-kg-s")
+        fm.shells.ShellMesh(nodes, {"quad": quads}),
+        fm.shells.ShellProperty(T, STEEL),
+        name="plate",
+        units=unit_system("m-kg-s"),
     )
 
 
@@ -49,11 +52,15 @@ def test_resultants_of_a_stretched_and_bent_plate():
 
 def test_a_spring_shows_its_stiffness_times_its_elongation():
     nodes = np.array([[0.0, 0, 0], [1, 0, 0], [1, 0.2, 0], [2, 0.2, 0]])
-    mesh = fm.LineMesh(nodes, np.array([[0, 1], [2, 3]]))
+    mesh = fm.beams.LineMesh(nodes, np.array([[0, 1], [2, 3]]))
     triad = np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, -1]])  # columns: its axes, x along y
-    spring = fm.Spring((1, 2), [1e4, 2e3, 0, 0, 0, 5.0], triad=triad)
+    spring = fm.beams.Spring((1, 2), [1e4, 2e3, 0, 0, 0, 5.0], triad=triad)
     body = fm.beam_body(
-        mesh, fm.BeamProperty(fm.Circle(0.01), STEEL), name="two", units=unit_system("m-kg-s"), springs=[spring]
+        mesh,
+        fm.beams.BeamProperty(fm.beams.Circle(0.01), STEEL),
+        name="two",
+        units=unit_system("m-kg-s"),
+        springs=[spring],
     )
     beams, _, springs = element_groups(body)
     assert (beams.quantity, springs.quantity, springs.names) == ("beam force", "spring force", ("0",))
@@ -69,11 +76,13 @@ def test_a_spring_shows_its_stiffness_times_its_elongation():
 
 def test_elements_are_called_as_the_user_does():
     nodes = np.stack([np.arange(4.0), np.zeros(4), np.zeros(4)], axis=1)
-    mesh = fm.LineMesh(
+    mesh = fm.beams.LineMesh(
         nodes, np.array([[0, 1], [1, 2], [2, 3]]), line_numbers=np.array([40, 20, 30]),
         line_sets={"braces": np.array([2, 0])},
     )  # fmt: skip
-    body = fm.beam_body(mesh, fm.BeamProperty(fm.Circle(0.01), STEEL), name="frame", units=unit_system("m-kg-s"))
+    body = fm.beam_body(
+        mesh, fm.beams.BeamProperty(fm.beams.Circle(0.01), STEEL), name="frame", units=unit_system("m-kg-s")
+    )
     group, _ = element_groups(body)
     assert group.names == ("40", "20", "30")
     assert group.numbers.tolist() == [40, 20, 30]
@@ -84,10 +93,12 @@ def test_elements_are_called_as_the_user_does():
 
 def test_beams_on_a_shell_know_which_nodes_of_the_body_are_theirs():
     """Behind the nodes and the skin of the shell: places that the groups name are those of their own models."""
-    mesh = replace(fm.flat_plate(1.0, 0.5, 2, 1), lines=np.array([[0, 1], [1, 2]]), line_sets={"rib": np.arange(2)})
-    bar = fm.BeamProperty(fm.Rectangle(0.02, 0.03), STEEL)
+    mesh = replace(
+        fm.shells.flat_plate(1.0, 0.5, 2, 1), lines=np.array([[0, 1], [1, 2]]), line_sets={"rib": np.arange(2)}
+    )
+    bar = fm.beams.BeamProperty(fm.beams.Rectangle(0.02, 0.03), STEEL)
     body = fm.shell_body(
-        mesh, fm.ShellProperty(T, STEEL), name="p", units=unit_system("m-kg-s"), stiffeners={"rib": bar}
+        mesh, fm.shells.ShellProperty(T, STEEL), name="p", units=unit_system("m-kg-s"), stiffeners={"rib": bar}
     )
     groups = element_groups(body)
     beams = next(group for group in groups if group.quantity == "beam force")
@@ -105,13 +116,13 @@ def bodies_of_all_elements(name: str):
         return np.asarray(value) / units.to_si(mass=mass, length=length, time=time)
 
     steel = fm.Material("steel", E=float(si(2e11, 1, -1, -2)), nu=0.3, rho=float(si(7800.0, 1, -3)))
-    lines = fm.LineMesh(si([[0.0, 0, 0], [1, 0.2, 0], [1, 0.4, 0.1]], length=1), np.array([[0, 1]]))
-    spring = fm.Spring((1, 2), [*si([1e4, 2e3, 3e3], 1, 0, -2), *si([5.0, 6, 7], 1, 2, -2)])
-    bar = fm.BeamProperty(fm.Rectangle(*si([0.02, 0.03], length=1).tolist()), steel)
+    lines = fm.beams.LineMesh(si([[0.0, 0, 0], [1, 0.2, 0], [1, 0.4, 0.1]], length=1), np.array([[0, 1]]))
+    spring = fm.beams.Spring((1, 2), [*si([1e4, 2e3, 3e3], 1, 0, -2), *si([5.0, 6, 7], 1, 2, -2)])
+    bar = fm.beams.BeamProperty(fm.beams.Rectangle(*si([0.02, 0.03], length=1).tolist()), steel)
     yield fm.beam_body(lines, bar, name="frame", units=units, springs=[spring])
-    plate = fm.flat_plate(float(si(1.0, length=1)), float(si(0.5, length=1)), 2, 1)
+    plate = fm.shells.flat_plate(float(si(1.0, length=1)), float(si(0.5, length=1)), 2, 1)
     plate = replace(plate, lines=np.array([[0, 1], [1, 2]]), line_sets={"rib": np.arange(2)})
-    t = fm.ShellProperty(float(si(T, length=1)), steel)
+    t = fm.shells.ShellProperty(float(si(T, length=1)), steel)
     yield fm.shell_body(plate, t, name="plate", units=units, stiffeners={"rib": bar})
     brick = box_mesh(2, 1, 1, *si([0.5, 0.2, 0.1], length=1).tolist(), kind="hexahedron")
     yield fm.solid_body(brick, steel, name="brick", units=units)

@@ -23,7 +23,7 @@ def mesh_columns(body, u):
 
 def test_a_moment_led_into_the_middle_of_a_beam_bends_both_sides_though_their_mean_is_none():
     """Simply supported, moment M about y in the middle: My = ± M/2 beside it, sigma = My z / Iy."""
-    body = fm.element_points(straight(2, length=1.0))
+    body = fm.body.element_points(straight(2, length=1.0))
     f, M = np.zeros(body.n_dof), 60.0
     f[6 + 4] = M
     u = solved(body, f, np.array([0, 1, 2, 3, 12 + 2]))
@@ -44,19 +44,19 @@ def test_points_of_a_frame_are_the_section_forces_of_each_element():
     body = space_frame()
     shapes = [str(k) for k in range(5)]
     with pytest.raises(BeamError, match="beam 5 has a section given by its numbers, and no outline"):
-        fm.element_points(body)
-    chosen = fm.element_points(body, [int(k) for k in shapes])
-    named = fm.section_points(body, range(5))
+        fm.body.element_points(body)
+    chosen = fm.body.element_points(body, [int(k) for k in shapes])
+    named = fm.beams.section_points(body, range(5))
     u = np.random.default_rng(1).standard_normal((body.n_dof, 3))
     mesh = body.mesh_displacement(u)
     assert_allclose(chosen.stress_points.stress(mesh), named.stress_points.stress(mesh), rtol=1e-12, atol=1e-3)
     assert_allclose(chosen.stress_points.positions, named.stress_points.positions, rtol=1e-14, atol=1e-14)
-    both = fm.element_points(named, [2])
+    both = fm.body.element_points(named, [2])
     assert both.stress_points.names[: len(named.stress_points.names)] == named.stress_points.names
     assert both.provenance["stress points"] == "at beams warping stresses are left out"
     outline = np.array([(0.01, -0.02), (0.01, 0.02), (-0.01, 0.02), (-0.01, -0.02)])
-    general = straight(2, fm.GeneralSection(1e-3, 2e-7, 3e-7, 1e-7, outline=outline))
-    assert "no shear stress" in fm.element_points(general).provenance["stress points"]
+    general = straight(2, fm.beams.GeneralSection(1e-3, 2e-7, 3e-7, 1e-7, outline=outline))
+    assert "no shear stress" in fm.body.element_points(general).provenance["stress points"]
 
 
 @pytest.mark.parametrize("kind", ["quad", "triangle"])
@@ -64,7 +64,7 @@ def test_corners_of_shells_show_their_cell_at_both_faces(kind):
     """A strip without Poisson's ratio under a line moment m in the middle: sigma = ± 6 (m/2) / t² on each side."""
     a, b, t, m = 2.0, 0.5, 0.02, 300.0
     body = plate(kind, 8, a, b, t, n_b=2, material=fm.Material("flat", E=2e11, nu=0.0, rho=1.0))
-    body = fm.element_points(body)
+    body = fm.body.element_points(body)
     nodes = body.nodes[: body.element_model.n_nodes]
     middle = np.flatnonzero(np.abs(nodes[:, 0] - a / 2) < 1e-9)
     share = np.where(np.isin(np.abs(nodes[middle, 1] - b / 2), [b / 2]), 0.25, 0.5)
@@ -93,20 +93,20 @@ def test_elements_are_chosen_by_number_and_set_and_refused_by_name():
     numbers = 100 + np.asarray(body.element_model.skin.line_of)
     numbering = replace(body.numbering, elements=numbers, sets=(NamedSet("LAST", "elements", triangles, 1),))
     body = replace(body, numbering=numbering)
-    assert {name.split()[1] for name in fm.element_points(body, [101]).stress_points.names} == {"101"}
-    assert {name.split()[1] for name in fm.element_points(body, "LAST").stress_points.names} == {"102"}
+    assert {name.split()[1] for name in fm.body.element_points(body, [101]).stress_points.names} == {"101"}
+    assert {name.split()[1] for name in fm.body.element_points(body, "LAST").stress_points.names} == {"102"}
     with pytest.raises(BodyError, match="no element, set or part 'LOST'"):
-        fm.element_points(body, ["LOST"])
+        fm.body.element_points(body, ["LOST"])
     with pytest.raises(BodyError, match="or 'all', got none"):
-        fm.element_points(body, [])
-    mesh = fm.LineMesh(np.array([[0.0, 0, 0], [1, 0, 0]]), np.array([[0, 1]]))
-    welded = fm.beam_body(mesh, fm.BeamProperty(fm.Circle(0.01), STEEL), name="one", units=SI)
-    assert len(fm.element_points(welded).stress_points.names) == 2 * len(welded.element_model.sections[0].points)
+        fm.body.element_points(body, [])
+    mesh = fm.beams.LineMesh(np.array([[0.0, 0, 0], [1, 0, 0]]), np.array([[0, 1]]))
+    welded = fm.beam_body(mesh, fm.beams.BeamProperty(fm.beams.Circle(0.01), STEEL), name="one", units=SI)
+    assert len(fm.body.element_points(welded).stress_points.names) == 2 * len(welded.element_model.sections[0].points)
 
 
 @pytest.mark.parametrize("kind", ["quad", "triangle"])
 def test_of_one_cell_the_corners_are_the_points_of_its_skin(kind):
-    body = fm.element_points(plate("quad", 1, 1.0, 0.7, 0.1) if kind == "quad" else one_triangle())
+    body = fm.body.element_points(plate("quad", 1, 1.0, 0.7, 0.1) if kind == "quad" else one_triangle())
     mesh = mesh_columns(body, np.random.default_rng(2).standard_normal(body.n_dof))
     skin = body.element_model.nodal_stress(mesh)
     points = body.stress_points
@@ -117,8 +117,8 @@ def test_of_one_cell_the_corners_are_the_points_of_its_skin(kind):
 
 def one_triangle():
     nodes = np.array([[0.0, 0, 0], [1, 0, 0.2], [0.1, 0.8, 0]])
-    mesh = fm.ShellMesh(nodes, {"triangle": np.array([[0, 1, 2]])})
-    return fm.shell_body(mesh, fm.ShellProperty(0.05, STEEL), name="one", units=SI)
+    mesh = fm.shells.ShellMesh(nodes, {"triangle": np.array([[0, 1, 2]])})
+    return fm.shell_body(mesh, fm.shells.ShellProperty(0.05, STEEL), name="one", units=SI)
 
 
 def layered(incompatible=False, kind="hexahedron"):
@@ -132,7 +132,7 @@ def layered(incompatible=False, kind="hexahedron"):
 @pytest.mark.parametrize("incompatible", [False, True])
 def test_at_borders_each_material_has_its_own_stress(incompatible):
     """A strain of one size in both: E eps in each, and the node shows the stiffest."""
-    body = fm.element_points(layered(incompatible), "borders")
+    body = fm.body.element_points(layered(incompatible), "borders")
     eps = 1e-3
     u = np.zeros((body.n_dof, 1))
     u[0::3, 0] = eps * body.nodes[:, 0]
@@ -147,13 +147,15 @@ def test_at_borders_each_material_has_its_own_stress(incompatible):
     nodal = body.element_model.nodal_stress(u)[at_border, 0, 0]
     assert_allclose(nodal, 2e11 * eps, rtol=1e-9)
     with pytest.raises(BodyError, match="borders: it has no node at which solid cells of different materials meet"):
-        fm.element_points(fm.solid_body(box_mesh(2, 1, 1), STEEL, name="one", units=SI), "borders")
+        fm.body.element_points(fm.solid_body(box_mesh(2, 1, 1), STEEL, name="one", units=SI), "borders")
 
 
 def test_solid_cells_have_their_own_stress_where_the_nodal_one_is_a_mean():
     """Strains that jump from cell to cell: at a node between them each cell keeps its own, the node has their mean."""
     mesh = box_mesh(2, 1, 1, 1.0, 0.3, 0.2, "hexahedron20")
-    body = fm.element_points(fm.solid_body(mesh, fm.Material("m", E=2e11, nu=0.0, rho=1.0), name="b", units=SI), "all")
+    body = fm.body.element_points(
+        fm.solid_body(mesh, fm.Material("m", E=2e11, nu=0.0, rho=1.0), name="b", units=SI), "all"
+    )
     x, first, second = body.nodes[:, 0], 1e-3, -4e-4
     u = np.zeros((body.n_dof, 1))
     u[0::3, 0] = first * np.minimum(x, 0.5) + second * np.maximum(x - 0.5, 0.0)

@@ -32,7 +32,7 @@ def line_field(body, eps, kappa_y, kappa_z, twist):
     return body.mesh_displacement(u.reshape(-1, 1))
 
 
-SECTIONS = (fm.Circle(0.01), fm.BoxSection(0.05, 0.08, 0.004, 0.006), fm.Rectangle(0.02, 0.03))
+SECTIONS = (fm.beams.Circle(0.01), fm.beams.BoxSection(0.05, 0.08, 0.004, 0.006), fm.beams.Rectangle(0.02, 0.03))
 
 
 @pytest.mark.parametrize("section", SECTIONS)
@@ -50,7 +50,7 @@ def test_strains_of_beams_are_stretch_curvatures_and_twist(section):
     axial = eps + kappa_y * z - kappa_z * y  # the fibre there
     assert_allclose(strain[:, 0], axial, atol=1e-13)
     assert_allclose(strain[:, 1], -NU * axial, atol=1e-13)
-    if isinstance(section, fm.Circle):  # tau = G twist r along the rim
+    if isinstance(section, fm.beams.Circle):  # tau = G twist r along the rim
         assert_allclose(np.hypot(strain[:, 4], strain[:, 5]), twist * 0.01, rtol=1e-9)
 
 
@@ -135,9 +135,11 @@ def test_in_a_quadratic_field_the_centre_has_the_gradient_at_its_place():
 
 
 def test_the_strain_of_orthotropic_layups_at_nodes_is_refused():
-    ply = fm.OrthotropicMaterial("ply", (1e11, 1e10, 1e10), (5e9, 5e9, 3e9), (0.3, 0.3, 0.3), 1.0)
-    layup = fm.LaminateProperty((fm.Layer(ply, 1e-3, 0.0), fm.Layer(ply, 1e-3, 90.0)), direction=(1, 0, 0))
-    body = fm.shell_body(fm.flat_plate(1.0, 1.0, 2, 2, kind="quad"), layup, name="layup", units=SI)
+    ply = fm.body.OrthotropicMaterial("ply", (1e11, 1e10, 1e10), (5e9, 5e9, 3e9), (0.3, 0.3, 0.3), 1.0)
+    layup = fm.shells.LaminateProperty(
+        (fm.shells.Layer(ply, 1e-3, 0.0), fm.shells.Layer(ply, 1e-3, 90.0)), direction=(1, 0, 0)
+    )
+    body = fm.shell_body(fm.shells.flat_plate(1.0, 1.0, 2, 2, kind="quad"), layup, name="layup", units=SI)
     mesh = body.mesh_displacement(np.ones((body.n_dof, 1)))
     with pytest.raises(BodyError, match='layup of OrthotropicMaterial is not known; ask for "shell strain"'):
         nodal_strain(body, mesh, np.array([len(body.nodes) - 1]))
@@ -169,7 +171,9 @@ def test_nodal_strains_of_welded_solids_are_those_of_their_own_material_and_moti
     for name, material, at, n in (("a", STEEL, 0.0, 2), ("b", ALUMINIUM, 1.0, 3)):
         mesh = box_mesh(n, 1, 1, 1.0, 0.3, 0.2, "hexahedron")
         mesh = replace(mesh, nodes=np.add(mesh.nodes, (at, 0, 0)))
-        ends = [fm.rigid_interface(mesh, f"{name}{x:g}", fm.Plane((x, 0, 0), (1, 0, 0))) for x in (at, at + 1)]
+        ends = [
+            fm.rigid_interface(mesh, f"{name}{x:g}", fm.selections.Plane((x, 0, 0), (1, 0, 0))) for x in (at, at + 1)
+        ]
         blocks.append(fm.couple(fm.solid_body(mesh, material, name=name, units=SI, interfaces=ends)))
     body = fm.weld(blocks, [(("a", "a1"), ("b", "b1"))], name="both")
     first = np.concatenate([np.arange(len(block.element_model.mesh.nodes)) + at
@@ -182,10 +186,10 @@ def test_nodal_strains_of_welded_solids_are_those_of_their_own_material_and_moti
 
 
 def test_nodal_strains_of_a_stiffened_plate_are_those_of_shell_and_beam():
-    mesh = fm.flat_plate(1.0, 0.5, 2, 1)
+    mesh = fm.shells.flat_plate(1.0, 0.5, 2, 1)
     mesh = replace(mesh, lines=np.array([[0, 1], [1, 2]]), line_sets={"rib": np.arange(2)})
-    rib = fm.BeamProperty(fm.Rectangle(0.02, 0.03), ALUMINIUM)
-    body = fm.shell_body(mesh, fm.ShellProperty(0.01, STEEL), name="plate", units=SI, stiffeners={"rib": rib})
+    rib = fm.beams.BeamProperty(fm.beams.Rectangle(0.02, 0.03), ALUMINIUM)
+    body = fm.shell_body(mesh, fm.shells.ShellProperty(0.01, STEEL), name="plate", units=SI, stiffeners={"rib": rib})
     model = body.element_model
     n_shell = model.shell.n_nodes + len(model.shell.skin.points)
     on_rib = n_shell + model.frame.n_nodes + np.arange(len(model.frame.skin.points))
@@ -198,8 +202,10 @@ def test_nodal_strains_of_a_stiffened_plate_are_those_of_shell_and_beam():
 
 def test_nodal_strains_of_a_layup_are_those_of_the_material_of_its_face():
     """Steel below, twice as thick as aluminium above: at the two faces, and at the middle in steel."""
-    layup = fm.LaminateProperty((fm.Layer(STEEL, 2e-3, 0.0), fm.Layer(ALUMINIUM, 1e-3, 0.0)), direction=(1, 0, 0))
-    body = fm.shell_body(fm.flat_plate(1.0, 0.6, 2, 2, kind="quad"), layup, name="layup", units=SI)
+    layup = fm.shells.LaminateProperty(
+        (fm.shells.Layer(STEEL, 2e-3, 0.0), fm.shells.Layer(ALUMINIUM, 1e-3, 0.0)), direction=(1, 0, 0)
+    )
+    body = fm.shell_body(fm.shells.flat_plate(1.0, 0.6, 2, 2, kind="quad"), layup, name="layup", units=SI)
     nodes = np.arange(len(body.nodes))
     strain, stress = strain_and_stress(body, nodes)
     above = body.nodes[:, 2] > 1e-9

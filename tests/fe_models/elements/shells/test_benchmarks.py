@@ -28,7 +28,7 @@ def test_nafems_fv12_free_thin_plate(kind, limit):
     """Modes 4 to 9; lambda² of the thin plate by a Ritz series (Leissa 1973, improved by Gorman 1978)."""
     lambda2 = np.array([13.468, 19.596, 24.270, 34.801, 34.801, 61.093])
     assert_allclose(lambda2 * THIN_PLATE, [1.622, 2.360, 2.922, 4.190, 4.190, 7.356], rtol=3e-4)
-    mesh = fm.flat_plate(10.0, 10.0, 16, 16, kind=kind)
+    mesh = fm.shells.flat_plate(10.0, 10.0, 16, 16, kind=kind)
     f = frequencies(plate(kind, 16), across(mesh), 9)
     assert f[2] < 1e-3 * f[3]
     assert_allclose(f[3:], lambda2 * THIN_PLATE, rtol=limit)
@@ -38,7 +38,7 @@ def test_nafems_fv12_free_thin_plate(kind, limit):
 def test_nafems_fv16_cantilevered_thin_plate(kind, limit):
     """NAFEMS' targets, 0.421 1.029 2.582 3.306 3.753 6.555 Hz, are upper bounds; the series is up to 1 % lower."""
     lambda2 = np.array([3.471, 8.507, 21.285, 27.199, 30.957, 54.19])
-    mesh = fm.flat_plate(10.0, 10.0, 16, 16, kind=kind)
+    mesh = fm.shells.flat_plate(10.0, 10.0, 16, 16, kind=kind)
     fixed = np.union1d(across(mesh), of_nodes(mesh.node_sets["u0"], *range(6)))
     f = frequencies(plate(kind, 16), fixed, 6)
     assert_allclose(f, lambda2 * THIN_PLATE, rtol=limit)
@@ -47,8 +47,10 @@ def test_nafems_fv16_cantilevered_thin_plate(kind, limit):
 
 @pytest.mark.parametrize(("kind", "limit"), [("quad", 0.006), ("triangle", 0.01)])
 def test_nafems_fv32_tapered_membrane(kind, limit):
-    mesh = fm.mapped_shell(lambda u, v: np.stack([10 * u, (v - 0.5) * (5 - 4 * u), 0 * u], axis=1), 32, 16, kind=kind)
-    body = fm.shell_body(mesh, fm.ShellProperty(0.05, STEEL), name="membrane", units=SI)
+    mesh = fm.shells.mapped_shell(
+        lambda u, v: np.stack([10 * u, (v - 0.5) * (5 - 4 * u), 0 * u], axis=1), 32, 16, kind=kind
+    )
+    body = fm.shell_body(mesh, fm.shells.ShellProperty(0.05, STEEL), name="membrane", units=SI)
     fixed = np.union1d(in_plane(mesh), of_nodes(mesh.node_sets["u0"], 0, 1))
     assert_allclose(frequencies(body, fixed, 6), [44.623, 130.03, 162.70, 246.05, 379.90, 391.44], rtol=limit)
 
@@ -94,7 +96,7 @@ def test_frequencies_of_a_hinged_plate_converge_at_second_order_or_better(kind, 
         assert_allclose(exact, [45.897, 109.44, 109.44, 167.89], rtol=2.5e-3)
     errors = []
     for n in (10, 20, 40):
-        mesh = fm.flat_plate(10.0, 10.0, n, n, kind=kind)
+        mesh = fm.shells.flat_plate(10.0, 10.0, n, n, kind=kind)
         errors.append(np.abs(frequencies(plate(kind, n, t=t), hinged(mesh), 4) / exact - 1).max())
     assert errors[2] < 0.0025
     assert np.log2(errors[1] / errors[2]) > 1.85
@@ -103,7 +105,7 @@ def test_frequencies_of_a_hinged_plate_converge_at_second_order_or_better(kind, 
 @pytest.mark.parametrize("kind", KINDS)
 def test_nafems_fv52_solid_square_plate_on_a_line_support(kind):
     """The in-plane modes are 193.59 and 206.19 Hz twice; those on the line support drift with the mesh: in bands."""
-    mesh = fm.flat_plate(10.0, 10.0, 16, 16, kind=kind)
+    mesh = fm.shells.flat_plate(10.0, 10.0, 16, 16, kind=kind)
     rim = np.unique(np.concatenate(list(mesh.node_sets.values())))
     body = plate(kind, 16, t=1.0)
     f = frequencies(body, of_nodes(rim, 2), 7)
@@ -117,26 +119,28 @@ def scordelis_lo(kind, n):
     """The sag in the middle of the free edge of a roof under its weight; a quarter of it (MacNeal & Harder 1985)."""
     R, length, angle = 25.0, 50.0, np.deg2rad(40.0)
     material = fm.Material("concrete", E=4.32e8, nu=0.0, rho=90.0 / 0.25)  # 90 per area for a unit acceleration
-    mesh = fm.mapped_shell(
+    mesh = fm.shells.mapped_shell(
         lambda u, v: np.stack([R * np.sin(angle * u), length / 2 * v, R * np.cos(angle * u)], axis=1), n, n, kind=kind
     )
-    body = fm.shell_body(mesh, fm.ShellProperty(0.25, material), name="roof", units=SI)
+    body = fm.shell_body(mesh, fm.shells.ShellProperty(0.25, material), name="roof", units=SI)
     sets = mesh.node_sets
     fixed = [of_nodes(sets["v1"], 0, 2), of_nodes(sets["v0"], 1, 3, 5), of_nodes(sets["u0"], 0, 4, 5)]
-    u = solved(body, fm.gravity_load(body, "weight", (0, 0, -1)).f, np.unique(np.concatenate(fixed)))
+    u = solved(body, fm.loads.gravity_load(body, "weight", (0, 0, -1)).f, np.unique(np.concatenate(fixed)))
     return -u[6 * np.intersect1d(sets["u1"], sets["v0"])[0] + 2]
 
 
 def pinched_cylinder(kind, n):
     """The deflection under one of two opposite forces on a cylinder with end diaphragms; an eighth of it."""
     R, length = 300.0, 600.0
-    mesh = fm.mapped_shell(
+    mesh = fm.shells.mapped_shell(
         lambda u, v: np.stack([R * np.sin(np.pi / 2 * u), length / 2 * v, R * np.cos(np.pi / 2 * u)], axis=1),
         n,
         n,
         kind=kind,
     )
-    body = fm.shell_body(mesh, fm.ShellProperty(3.0, fm.Material("m", E=3e6, nu=0.3, rho=1.0)), name="can", units=SI)
+    body = fm.shell_body(
+        mesh, fm.shells.ShellProperty(3.0, fm.Material("m", E=3e6, nu=0.3, rho=1.0)), name="can", units=SI
+    )
     sets = mesh.node_sets
     fixed = [
         of_nodes(sets["v1"], 0, 2),
@@ -176,8 +180,10 @@ def test_twisted_beam_of_warped_quads(kind, limit):
         angle, y = np.pi / 2 * u, 1.1 * (v - 0.5)
         return np.stack([12 * u, y * np.cos(angle), y * np.sin(angle)], axis=1)
 
-    mesh = fm.mapped_shell(surface, 24, 4, kind=kind)
-    body = fm.shell_body(mesh, fm.ShellProperty(0.32, fm.Material("m", E=29e6, nu=0.22, rho=1.0)), name="t", units=SI)
+    mesh = fm.shells.mapped_shell(surface, 24, 4, kind=kind)
+    body = fm.shell_body(
+        mesh, fm.shells.ShellProperty(0.32, fm.Material("m", E=29e6, nu=0.22, rho=1.0)), name="t", units=SI
+    )
     tip = np.flatnonzero(np.abs(mesh.nodes - [12.0, 0.0, 0.0]).max(axis=1) < 1e-9)[0]
     fixed = of_nodes(mesh.node_sets["u0"], *range(6))
     for component, target in ((2, 0.005424), (1, 0.001754)):
@@ -201,8 +207,8 @@ def test_a_folded_strip_bends_and_twists_as_the_frame_of_its_legs(kind):
         s = 2 * L * u
         return np.stack([np.minimum(s, L), b * (v - 0.5), np.maximum(s - L, 0.0)], axis=1)
 
-    mesh = fm.mapped_shell(surface, 48, 6, kind=kind)
-    body = fm.shell_body(mesh, fm.ShellProperty(t, material), name="L", units=SI)
+    mesh = fm.shells.mapped_shell(surface, 48, 6, kind=kind)
+    body = fm.shell_body(mesh, fm.shells.ShellProperty(t, material), name="L", units=SI)
     tip = np.flatnonzero(np.abs(mesh.nodes - [L, 0.0, L]).max(axis=1) < 1e-9)[0]
     fixed = of_nodes(mesh.node_sets["u0"], *range(6))
     inertia, wide, shear = b * t**3 / 12, t * b**3 / 12, 5 / 6 * G * b * t
@@ -220,13 +226,13 @@ def test_an_eccentric_stiffener_makes_a_composite_section(kind):
     """A strip with a bar beneath it under an end moment: parallel axis theorem, nu = 0, full shear connection."""
     length, b, t, height, width = 2.0, 0.2, 0.01, 0.05, 0.02
     material = replace(STEEL, nu=0.0)
-    mesh = fm.flat_plate(length, b, 16, 2, kind=kind)
+    mesh = fm.shells.flat_plate(length, b, 16, 2, kind=kind)
     middle = np.flatnonzero(np.abs(mesh.nodes[:, 1] - b / 2) < 1e-12)
     middle = middle[np.argsort(mesh.nodes[middle, 0])]
     mesh = replace(mesh, lines=np.stack([middle[:-1], middle[1:]], axis=1), line_sets={"bar": np.arange(16)})
     e = (t + height) / 2
-    bar = fm.BeamProperty(fm.Rectangle(width, height), material, offset=(0.0, -e))
-    body = fm.shell_body(mesh, fm.ShellProperty(t, material), name="strip", units=SI, stiffeners={"bar": bar})
+    bar = fm.beams.BeamProperty(fm.beams.Rectangle(width, height), material, offset=(0.0, -e))
+    body = fm.shell_body(mesh, fm.shells.ShellProperty(t, material), name="strip", units=SI, stiffeners={"bar": bar})
     M = 100.0
     f = np.zeros(body.n_dof)
     f[6 * middle[-1] + 4] = M

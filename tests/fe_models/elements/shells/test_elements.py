@@ -22,8 +22,8 @@ def cell(kind, *, warp=0.0, offset=0.0, t=0.1):
     nodes = np.array([(0.0, 0, warp), (1.0, 0.1, -warp), (1.2, 0.9, warp), (-0.1, 0.8, -warp)])
     n = 3 if kind == "triangle" else 4
     turn = QUARTER_TURNED * np.linalg.det(QUARTER_TURNED)
-    mesh = fm.ShellMesh(nodes[:n] @ turn.T + np.array([1.0, 2.0, 3.0]), {kind: np.arange(n)[None]})
-    return fm.shell_body(mesh, fm.ShellProperty(t, STEEL, offset=offset), name="cell", units=SI)
+    mesh = fm.shells.ShellMesh(nodes[:n] @ turn.T + np.array([1.0, 2.0, 3.0]), {kind: np.arange(n)[None]})
+    return fm.shell_body(mesh, fm.shells.ShellProperty(t, STEEL, offset=offset), name="cell", units=SI)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -40,8 +40,8 @@ def test_one_element_has_six_rigid_modes_and_no_others_without_energy(kind, offs
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_distorted_patch_has_six_rigid_modes(kind):
-    mesh = distorted(fm.flat_plate(1.0, 1.0, 4, 4, kind=kind), warp=0.05)
-    body = fm.shell_body(mesh, fm.ShellProperty(0.05, STEEL), name="patch", units=SI)
+    mesh = distorted(fm.shells.flat_plate(1.0, 1.0, 4, 4, kind=kind), warp=0.05)
+    body = fm.shell_body(mesh, fm.shells.ShellProperty(0.05, STEEL), name="patch", units=SI)
     lam = np.linalg.eigvalsh(body.K.toarray())
     assert lam[5] < 1e-10 * lam[-1]
     assert lam[6] > 1e-8 * lam[-1]
@@ -49,8 +49,8 @@ def test_a_distorted_patch_has_six_rigid_modes(kind):
 
 def patch(kind, field, t=0.05):
     """Displacements and stress of a distorted patch whose rim follows a field; (body, u, field, stress)."""
-    mesh = distorted(fm.flat_plate(1.0, 1.3, 4, 4, kind=kind), 0.3)
-    body = fm.shell_body(mesh, fm.ShellProperty(t, STEEL), name="patch", units=SI)
+    mesh = distorted(fm.shells.flat_plate(1.0, 1.3, 4, 4, kind=kind), 0.3)
+    body = fm.shell_body(mesh, fm.shells.ShellProperty(t, STEEL), name="patch", units=SI)
     exact = field(mesh.nodes[:, 0], mesh.nodes[:, 1]).ravel()
     rim = of_nodes(np.unique(np.concatenate(list(mesh.node_sets.values()))), *range(6))
     u = solved(body, np.zeros(body.n_dof), rim, exact[rim])
@@ -114,8 +114,8 @@ def test_in_plane_bending_of_rectangles_of_any_aspect_ratio(kind, limit):
     for n in (2, 8):
         length, height, t = 8.0, 1.0, 0.1
         material = replace(STEEL, nu=0.0)
-        mesh = fm.flat_plate(length, height, n, 1, kind=kind)
-        body = fm.shell_body(mesh, fm.ShellProperty(t, material), name="beam", units=SI)
+        mesh = fm.shells.flat_plate(length, height, n, 1, kind=kind)
+        body = fm.shell_body(mesh, fm.shells.ShellProperty(t, material), name="beam", units=SI)
         f = np.zeros(body.n_dof)
         end = mesh.node_sets["u1"]
         f[of_nodes(end, 0)] = np.where(mesh.nodes[end, 1] > 0.5, -1.0, 1.0)
@@ -131,8 +131,8 @@ def test_in_plane_bending_of_rectangles_of_any_aspect_ratio(kind, limit):
 def test_shear_strain_of_a_quad_is_that_of_its_sides_in_their_middles():
     """phi/(1 + phi) of (w_j - w_i)/L plus the mean rotation along the side, phi = 12 D/(kappa G t L²); thin: none."""
     a, b, t = 1.3, 0.7, 0.1
-    mesh = fm.flat_plate(a, b, 1, 1)
-    body = fm.shell_body(mesh, fm.ShellProperty(t, STEEL), name="cell", units=SI)
+    mesh = fm.shells.flat_plate(a, b, 1, 1)
+    body = fm.shell_body(mesh, fm.shells.ShellProperty(t, STEEL), name="cell", units=SI)
     D_over_shear = STEEL.E * t**3 / (12 * (1 - STEEL.nu**2)) / (5 / 6 * STEEL.mu * t)
     (group,) = body.element_model.groups
     u = np.random.default_rng(0).normal(size=(4, 6))  # nodes 0 (0, 0), 1 (0, b), 2 (a, 0), 3 (a, b)
@@ -161,10 +161,10 @@ def test_thin_plates_do_not_lock(kind):
     """The centre of a clamped square under pressure, thin to the limit: w = 0.00126532 q a⁴/D (Taylor & Govindjee)."""
     for t in (1e-1, 1e-3, 1e-5):
         n = 16
-        mesh = fm.flat_plate(10.0, 10.0, n, n, kind=kind)
-        body = fm.shell_body(mesh, fm.ShellProperty(t, STEEL), name="plate", units=SI)
+        mesh = fm.shells.flat_plate(10.0, 10.0, n, n, kind=kind)
+        body = fm.shell_body(mesh, fm.shells.ShellProperty(t, STEEL), name="plate", units=SI)
         D = STEEL.E * t**3 / (12 * (1 - STEEL.nu**2))
-        load = fm.pressure_load(body, mesh, "p", fm.FaceGroup("shell"), -D)
+        load = fm.loads.pressure_load(body, mesh, "p", fm.selections.FaceGroup("shell"), -D)
         rim = np.unique(np.concatenate(list(mesh.node_sets.values())))
         u = solved(body, load.f, np.union1d(of_nodes(rim, *range(6)), of_nodes(np.arange(len(mesh.nodes)), 0, 1, 5)))
         center = np.flatnonzero(np.abs(mesh.nodes - [5.0, 5.0, 0.0]).max(axis=1) < 1e-9)
@@ -173,8 +173,8 @@ def test_thin_plates_do_not_lock(kind):
 
 def test_invariants_through_the_thickness_are_those_of_a_solid_of_the_same_shape_in_the_same_motion():
     t = 0.3
-    mesh = fm.flat_plate(2.0, 1.5, 2, 2)
-    shell = fm.shell_body(mesh, fm.ShellProperty(t, STEEL), name="shell", units=SI)
+    mesh = fm.shells.flat_plate(2.0, 1.5, 2, 2)
+    shell = fm.shell_body(mesh, fm.shells.ShellProperty(t, STEEL), name="shell", units=SI)
     rng = np.random.default_rng(0)
     u = rng.normal(size=(shell.n_dof, 2))
     fields = [shell_fields(mesh, column, DRILLING_SHARE["quad"]) for column in u.T]
@@ -208,8 +208,10 @@ def test_invariants_through_the_thickness_are_those_of_a_solid_of_the_same_shape
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_mass_and_invariants_come_from_one_field(kind):
-    mesh = distorted(fm.flat_plate(1.0, 1.0, 3, 3, kind=kind), warp=0.03)
-    body = fm.shell_body(mesh, fm.ShellProperty(0.1, STEEL, offset=0.05, added_mass=30.0), name="patch", units=SI)
+    mesh = distorted(fm.shells.flat_plate(1.0, 1.0, 3, 3, kind=kind), warp=0.03)
+    body = fm.shell_body(
+        mesh, fm.shells.ShellProperty(0.1, STEEL, offset=0.05, added_mass=30.0), name="patch", units=SI
+    )
     u = np.random.default_rng(1).normal(size=(body.n_dof, 3))
     gram = body.element_model.mass_gram(body.mesh_displacement(u))
     S = sum(gram[4 + 3 * a : 7 + 3 * a, 4 + 3 * a : 7 + 3 * a] for a in range(3))
@@ -224,11 +226,11 @@ def test_mass_and_invariants_come_from_one_field(kind):
 
 
 def test_an_offset_is_a_mesh_moved_along_the_normal():
-    mesh = distorted(fm.flat_plate(1.0, 1.0, 3, 3))
+    mesh = distorted(fm.shells.flat_plate(1.0, 1.0, 3, 3))
     shifted = replace(mesh, nodes=mesh.nodes + np.array([0.0, 0.0, 0.2]))
     bodies = [
-        fm.shell_body(mesh, fm.ShellProperty(0.1, STEEL, offset=0.2), name="offset", units=SI),
-        fm.shell_body(shifted, fm.ShellProperty(0.1, STEEL), name="moved", units=SI),
+        fm.shell_body(mesh, fm.shells.ShellProperty(0.1, STEEL, offset=0.2), name="offset", units=SI),
+        fm.shell_body(shifted, fm.shells.ShellProperty(0.1, STEEL), name="moved", units=SI),
     ]
     arm = np.tile(np.eye(6), (len(mesh.nodes), 1, 1))  # u_moved = u + theta x (0, 0, e)
     arm[:, 0, 4], arm[:, 1, 3] = 0.2, -0.2
@@ -246,16 +248,17 @@ def test_an_offset_is_a_mesh_moved_along_the_normal():
 def test_results_do_not_depend_on_the_first_node_of_a_cell():
     """Up to rounding of the local axes; the shape of the deflection is that of the plate, not of the numbering."""
     for kind in KINDS:
-        mesh = distorted(fm.flat_plate(1.0, 1.0, 2, 2, kind=kind), warp=0.02)
+        mesh = distorted(fm.shells.flat_plate(1.0, 1.0, 2, 2, kind=kind), warp=0.02)
         rolled = replace(mesh, cells={kind: np.roll(mesh.cells[kind], 1, axis=1)})
         K, other = (
-            fm.shell_body(m, fm.ShellProperty(0.05, STEEL), name="p", units=SI).K.toarray() for m in (mesh, rolled)
+            fm.shell_body(m, fm.shells.ShellProperty(0.05, STEEL), name="p", units=SI).K.toarray()
+            for m in (mesh, rolled)
         )
         assert_allclose(other, K, rtol=0, atol=1e-11 * np.abs(K).max())
 
 
 def test_a_free_plate_reduces_with_six_rigid_motions():
     body = cms.couple(plate(n=4))
-    reduced = cms.reduce(body, cms.normal_modes(body, n_modes=6))
+    reduced = cms.reduce(body, cms.modes.normal_modes(body, n_modes=6))
     assert reduced.provenance["mode set rigid-body motions removed"] == "6"
     assert reduced.moments.is_exact

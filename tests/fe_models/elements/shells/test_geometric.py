@@ -23,13 +23,15 @@ def bent_strip(kind, *, offset=0.04, stiffened=False):
     def surface(u, v):
         return np.stack([np.sin(1.5 * u), 0.4 * v + 0.1 * u * v, np.cos(1.5 * u) + 0.1 * v**2], axis=1)
 
-    mesh = fm.mapped_shell(surface, 6, 2, kind=kind)
+    mesh = fm.shells.mapped_shell(surface, 6, 2, kind=kind)
     options = {}
     if stiffened:
         middle = np.setdiff1d(np.arange(len(mesh.nodes)), np.union1d(mesh.node_sets["v0"], mesh.node_sets["v1"]))
         mesh = replace(mesh, lines=np.stack([middle[:-1], middle[1:]], axis=1), line_sets={"bar": np.arange(6)})
-        options["stiffeners"] = {"bar": fm.BeamProperty(fm.Rectangle(0.02, 0.04), STEEL, offset=(0.02, -0.05))}
-    return fm.shell_body(mesh, fm.ShellProperty(0.05, STEEL, offset=offset), name="strip", units=SI, **options)
+        options["stiffeners"] = {
+            "bar": fm.beams.BeamProperty(fm.beams.Rectangle(0.02, 0.04), STEEL, offset=(0.02, -0.05))
+        }
+    return fm.shell_body(mesh, fm.shells.ShellProperty(0.05, STEEL, offset=offset), name="strip", units=SI, **options)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -123,8 +125,8 @@ def test_stress_stiffens_as_in_bricks_of_the_same_shape_in_the_same_motion(state
     """
     t = 0.3
     material = replace(STEEL, nu=0.0)
-    mesh = fm.flat_plate(2.0, 1.5, 2, 2)
-    shell = fm.shell_body(mesh, fm.ShellProperty(t, material), name="shell", units=SI)
+    mesh = fm.shells.flat_plate(2.0, 1.5, 2, 2)
+    shell = fm.shell_body(mesh, fm.shells.ShellProperty(t, material), name="shell", units=SI)
     x, y = mesh.nodes[:, 0], mesh.nodes[:, 1]
     zero = np.zeros(len(x))
     a, b, c = 0.3e-3, -0.7e-3, 0.5e-3
@@ -170,8 +172,8 @@ def buckling_factor(body, f, fixed):
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_hinged_square_buckles_under_four_pi_squared_D(kind):
     a, t, n = 1.0, 0.01, 10
-    mesh = fm.flat_plate(a, a, n, n, kind=kind)
-    body = fm.shell_body(mesh, fm.ShellProperty(t, STEEL), name="plate", units=SI)
+    mesh = fm.shells.flat_plate(a, a, n, n, kind=kind)
+    body = fm.shell_body(mesh, fm.shells.ShellProperty(t, STEEL), name="plate", units=SI)
     sets = mesh.node_sets
     f = np.zeros(body.n_dof)
     width = np.full(n + 1, a / n)
@@ -189,8 +191,8 @@ def test_a_strip_tips_over_under_an_end_moment_in_its_plane(kind, limit):
     """Lateral-torsional buckling of a cantilever: M = pi/(2 L) sqrt(E I_z G J)."""
     L, h, t = 1.0, 0.05, 0.001
     material = replace(STEEL, nu=0.0)
-    mesh = fm.flat_plate(L, h, 18, 4, kind=kind)
-    body = fm.shell_body(mesh, fm.ShellProperty(t, material), name="strip", units=SI)
+    mesh = fm.shells.flat_plate(L, h, 18, 4, kind=kind)
+    body = fm.shell_body(mesh, fm.shells.ShellProperty(t, material), name="strip", units=SI)
     end = mesh.node_sets["u1"]
     y = mesh.nodes[end, 1] - h / 2
     f = np.zeros(body.n_dof)
@@ -206,12 +208,14 @@ def test_a_spinning_blade_stiffens_as_the_beam_of_its_section(kind):
     """The reduced stiffness of all spins, over the first flap and lag shapes of a strip held at its root."""
     L, b, t = 1.0, 0.06, 0.01
     material = replace(STEEL, nu=0.0)
-    mesh = fm.flat_plate(L, b, 20, 2, kind=kind)
-    root = fm.shell_interface(mesh, "root", fm.NodeSet("u0"), reference=(0.0, b / 2, 0.0))
-    blade = fm.shell_body(mesh, fm.ShellProperty(t, material), name="blade", units=SI, interfaces=[root])
-    line = fm.straight_line((0, b / 2, 0), (L, b / 2, 0), 20)
-    held = fm.line_interface(line, "root", fm.NodeSet("start"))
-    beam = fm.beam_body(line, fm.BeamProperty(fm.Rectangle(b, t), material), name="beam", units=SI, interfaces=[held])
+    mesh = fm.shells.flat_plate(L, b, 20, 2, kind=kind)
+    root = fm.shells.shell_interface(mesh, "root", fm.selections.NodeSet("u0"), reference=(0.0, b / 2, 0.0))
+    blade = fm.shell_body(mesh, fm.shells.ShellProperty(t, material), name="blade", units=SI, interfaces=[root])
+    line = fm.beams.straight_line((0, b / 2, 0), (L, b / 2, 0), 20)
+    held = fm.beams.line_interface(line, "root", fm.selections.NodeSet("start"))
+    beam = fm.beam_body(
+        line, fm.beams.BeamProperty(fm.beams.Rectangle(b, t), material), name="beam", units=SI, interfaces=[held]
+    )
     spins = []
     for body in (cms.couple(blade), cms.couple(beam)):
         reduced = cms.reduce(body, cms.craig_bampton(body, n_modes=4), frame=cms.NodalFrame("root"), geometric=True)
@@ -232,8 +236,8 @@ def test_a_rotation_and_a_smooth_motion_meet_in_the_turned_forces_as_cells_get_s
     """Cells meet (theta × f, ½ theta × m) of the nodal forces to second order of their size."""
     errors = []
     for n in (8, 16, 32):
-        mesh = fm.flat_plate(1.0, 1.0, n, n, kind=kind)
-        body = fm.shell_body(mesh, fm.ShellProperty(0.05, STEEL), name="p", units=SI)
+        mesh = fm.shells.flat_plate(1.0, 1.0, n, n, kind=kind)
+        body = fm.shell_body(mesh, fm.shells.ShellProperty(0.05, STEEL), name="p", units=SI)
         x, y = mesh.nodes[:, 0], mesh.nodes[:, 1]
         zero = np.zeros(len(x))
         if state == "membrane":

@@ -18,14 +18,19 @@ from tests.fe_models.elements.shells.examples import balanced_state, turned_load
 from tests.fe_models.small_shells import KINDS, SI, STEEL, distorted, frequencies, of_nodes, solved
 
 E_1, E_2, NU, G, G_23 = 140e9, 10e9, 0.3, 5e9, 3.5e9
-PLY = fm.OrthotropicMaterial("ply", (E_1, E_2, E_2), (G, G, G_23), (NU, NU, 0.4), 1500.0)
+PLY = fm.body.OrthotropicMaterial("ply", (E_1, E_2, E_2), (G, G, G_23), (NU, NU, 0.4), 1500.0)
 HEAVY = replace(PLY, name="heavy", rho=2500.0)
 X = (1.0, 0.0, 0.0)
-ODD = (fm.Layer(PLY, 0.004, 30.0), fm.Layer(HEAVY, 0.002, -70.0), fm.Layer(STEEL, 0.001), fm.Layer(PLY, 0.003, 10.0))
+ODD = (
+    fm.shells.Layer(PLY, 0.004, 30.0),
+    fm.shells.Layer(HEAVY, 0.002, -70.0),
+    fm.shells.Layer(STEEL, 0.001),
+    fm.shells.Layer(PLY, 0.003, 10.0),
+)
 
 
 def laminate(*layers, direction=X, **more):
-    return fm.LaminateProperty(layers, direction, **more)
+    return fm.shells.LaminateProperty(layers, direction, **more)
 
 
 def shell(mesh, item):
@@ -36,7 +41,7 @@ def curved(kind):
     def surface(u, v):
         return np.stack([np.sin(1.5 * u), 0.4 * v + 0.1 * u * v, np.cos(1.5 * u) + 0.1 * v**2], axis=1)
 
-    return fm.mapped_shell(surface, 6, 2, kind=kind)
+    return fm.shells.mapped_shell(surface, 6, 2, kind=kind)
 
 
 def ply_tensor(angle):
@@ -88,7 +93,7 @@ def by_quadrature(angles, t):
 @pytest.mark.parametrize("angles", [(0,), (0, 90), (0, 90, 90, 0), (30, -45, 80)])
 def test_stiffness_is_the_integral_over_the_thickness(angles):
     t = 0.002
-    law = shell_law(laminate(*(fm.Layer(PLY, t, angle) for angle in angles)))
+    law = shell_law(laminate(*(fm.shells.Layer(PLY, t, angle) for angle in angles)))
     A, B, D, third, H = by_quadrature(angles, t)
     h = t * len(angles)
     for ours, other, size in ((law.A, A, h), (law.B, B, h**2), (law.D, D, h**3), (law.third, third, h**4)):
@@ -98,7 +103,7 @@ def test_stiffness_is_the_integral_over_the_thickness(angles):
 
 def test_one_isotropic_layer_has_five_sixths_of_its_shear_stiffness():
     t, nu = 0.03, STEEL.nu
-    law = shell_law(laminate(fm.Layer(STEEL, t, 33.0)))
+    law = shell_law(laminate(fm.shells.Layer(STEEL, t, 33.0)))
     C = STEEL.E / (1 - nu**2) * np.array([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]])
     expected = np.zeros((8, 8))
     expected[:3, :3], expected[3:6, 3:6], expected[6:, 6:] = t * C, t**3 / 12 * C, 5 / 6 * STEEL.mu * t * np.eye(2)
@@ -113,13 +118,13 @@ def matrices(stiffness=None, shear_stiffness=None, direction=X, *, thickness=0.0
     plane = E / (1 - nu**2) * np.array([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]])
     C = np.kron(np.diag([t, t**3 / 12]), plane) if stiffness is None else stiffness
     H = 5 / 6 * E / (2 + 2 * nu) * t * np.eye(2) if shear_stiffness is None else shear_stiffness
-    return fm.StiffnessProperty(thickness, C, H, direction, **more)
+    return fm.shells.StiffnessProperty(thickness, C, H, direction, **more)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_given_stiffness_of_a_plate_is_the_shell_of_its_material(kind):
     """But for the rotary inertia, which matrices do not give."""
-    one = shell(curved(kind), fm.ShellProperty(0.05, STEEL, offset=0.04, added_mass=7.0))
+    one = shell(curved(kind), fm.shells.ShellProperty(0.05, STEEL, offset=0.04, added_mass=7.0))
     item = matrices(direction=(0.3, 0.9, -0.4), offset=0.04, added_mass=7.0 + 0.05 * STEEL.rho)
     given = shell(curved(kind), item)
     K = one.K.toarray()
@@ -147,10 +152,10 @@ def test_given_stiffness_of_a_plate_is_the_shell_of_its_material(kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_isotropic_layers_are_the_shell_of_one_material(kind):
     """Three layers of steel, one of them as an orthotropic material of equal moduli, at any angles."""
-    same = fm.OrthotropicMaterial("same", 3 * (STEEL.E,), 3 * (STEEL.mu,), 3 * (STEEL.nu,), STEEL.rho)
-    layers = (fm.Layer(STEEL, 0.02, 20.0), fm.Layer(same, 0.012, 37.0), fm.Layer(STEEL, 0.018))
+    same = fm.body.OrthotropicMaterial("same", 3 * (STEEL.E,), 3 * (STEEL.mu,), 3 * (STEEL.nu,), STEEL.rho)
+    layers = (fm.shells.Layer(STEEL, 0.02, 20.0), fm.shells.Layer(same, 0.012, 37.0), fm.shells.Layer(STEEL, 0.018))
     more = {"offset": 0.04, "added_mass": 7.0}
-    one = shell(curved(kind), fm.ShellProperty(0.05, STEEL, **more))
+    one = shell(curved(kind), fm.shells.ShellProperty(0.05, STEEL, **more))
     three = shell(curved(kind), laminate(*layers, direction=(0.3, 0.9, -0.4), **more))
     for name in ("K", "M"):
         ours, expected = (getattr(body, name).toarray() for body in (three, one))
@@ -170,10 +175,10 @@ def test_isotropic_layers_are_the_shell_of_one_material(kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_stress_along_the_fibres_is_along_their_angle_from_the_projected_direction(kind):
     """One layer at 30 degrees: the strain of a stress s along a_1 is s/E_1 along it, -nu_12 s/E_1 across."""
-    mesh = distorted(fm.flat_plate(1.0, 0.8, 4, 3, kind=kind))
+    mesh = distorted(fm.shells.flat_plate(1.0, 0.8, 4, 3, kind=kind))
     angle, s = np.deg2rad(30.0 + 20.0), 1e6
     direction = (np.cos(np.deg2rad(20.0)), np.sin(np.deg2rad(20.0)), 1.5)
-    body = shell(mesh, laminate(fm.Layer(PLY, 0.02, 30.0), direction=direction))
+    body = shell(mesh, laminate(fm.shells.Layer(PLY, 0.02, 30.0), direction=direction))
     a_1, a_2 = np.array([[np.cos(angle), np.sin(angle), 0], [-np.sin(angle), np.cos(angle), 0]])
     strain = s / E_1 * np.outer(a_1, a_1) - NU * s / E_1 * np.outer(a_2, a_2)
     u = np.zeros((len(mesh.nodes), 6))
@@ -181,7 +186,7 @@ def test_stress_along_the_fibres_is_along_their_angle_from_the_projected_directi
     stress = body.element_model.nodal_stress(body.mesh_displacement(u.reshape(-1, 1)))[:, :, 0]
     expected = s * np.outer(a_1, a_1)[[0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]]
     assert_allclose(stress, np.tile(expected, (len(stress), 1)), rtol=0, atol=1e-9 * s)
-    layer = fm.layer_stress(body, u.reshape(-1, 1), {kind: [0, 3]}, 0)
+    layer = fm.shells.layer_stress(body, u.reshape(-1, 1), {kind: [0, 3]}, 0)
     assert_allclose(layer[..., 0], np.tile([s, 0, 0, 0, 0], (2, 2, 1)), rtol=0, atol=1e-9 * s)
 
 
@@ -189,7 +194,7 @@ def test_stress_along_the_fibres_is_along_their_angle_from_the_projected_directi
 @pytest.mark.parametrize(("layers", "angle"), [(ODD[:1], 25.0), (ODD, 90.0)])
 def test_layers_turned_are_the_mesh_turned_the_other_way(kind, layers, angle):
     """Many layers by a right angle: the transverse shear of angle plies depends on the axes of the layup otherwise."""
-    mesh = distorted(fm.flat_plate(1.0, 0.8, 3, 3, kind=kind))
+    mesh = distorted(fm.shells.flat_plate(1.0, 0.8, 3, 3, kind=kind))
     c, s = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
     R = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
     K = shell(replace(mesh, nodes=mesh.nodes @ R.T), laminate(*layers)).K.toarray()
@@ -200,7 +205,7 @@ def test_layers_turned_are_the_mesh_turned_the_other_way(kind, layers, angle):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_constant_strain_and_curvature_of_a_coupled_layup_are_exact_on_any_mesh(kind):
-    mesh = distorted(fm.flat_plate(1.0, 0.8, 5, 4, kind=kind))
+    mesh = distorted(fm.shells.flat_plate(1.0, 0.8, 5, 4, kind=kind))
     body = shell(mesh, laminate(*ODD))
     rng = np.random.default_rng(2)
     eps, kappa = rng.normal(size=3), 30 * rng.normal(size=3)
@@ -229,8 +234,8 @@ def test_a_strip_of_two_metals_bends_and_stretches_as_its_beam():
     low, high = (fm.Material("low", E=2.1e11, nu=0.0, rho=7800.0), fm.Material("high", E=0.7e11, nu=0.0, rho=2700.0))
     t_1, t_2, length, M = 0.003, 0.005, 0.5, 40.0
     for kind in KINDS:
-        mesh = fm.flat_plate(length, 0.1, 5, 1, kind=kind)
-        body = shell(mesh, laminate(fm.Layer(low, t_1), fm.Layer(high, t_2)))
+        mesh = fm.shells.flat_plate(length, 0.1, 5, 1, kind=kind)
+        body = shell(mesh, laminate(fm.shells.Layer(low, t_1), fm.shells.Layer(high, t_2)))
         x = mesh.nodes[:, 0]
         f = np.zeros(body.n_dof)
         end = np.flatnonzero(x > length - 1e-9)
@@ -245,7 +250,7 @@ def test_a_strip_of_two_metals_bends_and_stretches_as_its_beam():
         assert_allclose(u[end, 0], -c * kappa * length, rtol=1e-9, atol=0)
         z = np.array([-(t_1 + t_2) / 2, t_1 - (t_1 + t_2) / 2, (t_1 + t_2) / 2])
         for layer, E in ((0, low.E), (1, high.E)):
-            stress = fm.layer_stress(body, u.reshape(-1, 1), {kind: [2]}, layer)[0, :, :, 0]
+            stress = fm.shells.layer_stress(body, u.reshape(-1, 1), {kind: [2]}, layer)[0, :, :, 0]
             assert_allclose(stress[:, 0], E * kappa * (z[layer : layer + 2] - c), rtol=1e-8, atol=0)
 
 
@@ -312,11 +317,11 @@ def test_cross_plies_have_the_frequencies_and_the_deflection_of_naviers_series(k
     """Sides 1 and 0.8, thickness 0.04: errors fall with h², and what two meshes tend to is the series."""
     layers, a, b = CROSS_PLIES[name], 1.0, 0.8
     material = {1500.0: PLY, 2500.0: HEAVY}
-    item = laminate(*(fm.Layer(material[rho], t, angle) for t, angle, rho in layers))
+    item = laminate(*(fm.shells.Layer(material[rho], t, angle) for t, angle, rho in layers))
     expected = navier_frequencies(layers, a, b, 4)
     errors, deflections = [], []
     for n in (8, 16):
-        mesh = fm.flat_plate(a, b, n, n, kind=kind)
+        mesh = fm.shells.flat_plate(a, b, n, n, kind=kind)
         body = shell(mesh, item)
         held = simply_supported(mesh, a, b)
         errors.append(frequencies(body, held, 4) / expected - 1)
@@ -358,7 +363,7 @@ def test_thick_plates_vibrate_as_their_layers_of_bricks(angles):
 def test_mass_is_exact_through_layers_of_several_densities(kind):
     """Of a flat plate, against the boxes of its layers: mass, first and second moments; and rigid motion of M."""
     a, b, offset = 1.0, 0.8, 0.03
-    mesh = fm.flat_plate(a, b, 3, 2, kind=kind)
+    mesh = fm.shells.flat_plate(a, b, 3, 2, kind=kind)
     body = shell(mesh, laminate(*ODD, offset=offset, added_mass=4.0))
     gram = body.element_model.mass_gram(np.zeros((body.element_model.n_mesh_dof, 0)))
     h = sum(layer.thickness for layer in ODD)
@@ -399,8 +404,8 @@ def test_a_rigid_rotation_turns_the_forces_of_a_shell_of_layers(kind):
 
 def test_a_cross_ply_buckles_at_the_load_of_naviers_series():
     layers, a, b, n = CROSS_PLIES["0/90/90/0"], 1.0, 0.8, 16
-    mesh = fm.flat_plate(a, b, n, n)
-    body = shell(mesh, laminate(*(fm.Layer(PLY, t, angle) for t, angle, _ in layers)))
+    mesh = fm.shells.flat_plate(a, b, n, n)
+    body = shell(mesh, laminate(*(fm.shells.Layer(PLY, t, angle) for t, angle, _ in layers)))
     C, _ = cross_ply_law(layers)
     eps = np.linalg.solve(C[:3, :3], [-1.0, 0.0, 0.0])  # N_x = -1 everywhere
     x, y, _ = mesh.nodes.T
@@ -427,12 +432,15 @@ def test_a_cross_ply_buckles_at_the_load_of_naviers_series():
     ("make", "words"),
     [
         (lambda: laminate(), "layers: expected one Layer or more"),
-        (lambda: laminate(fm.Layer(PLY, 0.01), direction=(0, 0, 0)), "direction: expected a vector that is not zero"),
-        (lambda: laminate(fm.Layer(PLY, 0.01), direction=(0, 1)), "direction: expected three finite numbers"),
-        (lambda: fm.Layer(PLY, 0.0), "layer: thickness: expected a length above zero"),
-        (lambda: fm.Layer(PLY, 0.01, np.nan), "layer: angle: expected a finite number"),
-        (lambda: fm.Layer(replace(PLY, axes=((0, 1, 0), (-1, 0, 0), (0, 0, 1))), 0.01), "has axes of its own"),
-        (lambda: laminate(fm.Layer(PLY, 0.01), added_mass=-1.0), "added_mass: expected zero or more"),
+        (
+            lambda: laminate(fm.shells.Layer(PLY, 0.01), direction=(0, 0, 0)),
+            "direction: expected a vector that is not zero",
+        ),
+        (lambda: laminate(fm.shells.Layer(PLY, 0.01), direction=(0, 1)), "direction: expected three finite numbers"),
+        (lambda: fm.shells.Layer(PLY, 0.0), "layer: thickness: expected a length above zero"),
+        (lambda: fm.shells.Layer(PLY, 0.01, np.nan), "layer: angle: expected a finite number"),
+        (lambda: fm.shells.Layer(replace(PLY, axes=((0, 1, 0), (-1, 0, 0), (0, 0, 1))), 0.01), "has axes of its own"),
+        (lambda: laminate(fm.shells.Layer(PLY, 0.01), added_mass=-1.0), "added_mass: expected zero or more"),
         (lambda: matrices(np.eye(5)), "stiffness: expected 6 rows of 6 finite numbers"),
         (lambda: matrices(np.eye(6) + np.eye(6, k=1) / 2), "stiffness: expected a symmetric matrix"),
         (lambda: matrices(np.ones((6, 6))), "expected a positive definite matrix, got the scaled eigenvalue"),
@@ -449,14 +457,14 @@ def test_impossible_layups_are_refused(make, words):
 
 
 def test_cells_across_the_direction_and_layers_that_do_not_exist_are_refused():
-    mesh = fm.flat_plate(1.0, 1.0, 2, 2)
+    mesh = fm.shells.flat_plate(1.0, 1.0, 2, 2)
     with pytest.raises(ShellError, match=r"4 quad cells are normal to direction \(0.0, 0.01, 1.0\), first cell 0"):
         shell(mesh, laminate(*ODD, direction=(0, 0.01, 1)))
     body = shell(mesh, laminate(*ODD))
     with pytest.raises(ShellError, match=r"quad 1 has 4 layers; expected 0..3, got 4"):
-        fm.layer_stress(body, np.zeros((body.n_dof, 1)), {"quad": [1]}, 4)
+        fm.shells.layer_stress(body, np.zeros((body.n_dof, 1)), {"quad": [1]}, 4)
     with pytest.raises(ShellError, match="expected columns over 54 dofs"):
-        fm.layer_stress(body, np.zeros(body.n_dof), {"quad": [1]}, 0)
+        fm.shells.layer_stress(body, np.zeros(body.n_dof), {"quad": [1]}, 0)
 
 
 def test_transverse_shear_carries_its_force_vanishes_at_the_faces_and_does_not_jump():
@@ -475,7 +483,10 @@ def test_transverse_shear_carries_its_force_vanishes_at_the_faces_and_does_not_j
 
 
 def test_geometric_stiffness_takes_the_second_moment_of_the_stress_of_layers():
-    body = shell(fm.flat_plate(1.0, 1.0, 1, 1), laminate(fm.Layer(PLY, 0.01, 30.0), fm.Layer(PLY, 0.01, 80.0)))
+    body = shell(
+        fm.shells.flat_plate(1.0, 1.0, 1, 1),
+        laminate(fm.shells.Layer(PLY, 0.01, 30.0), fm.shells.Layer(PLY, 0.01, 80.0)),
+    )
     _, _, D, third, _ = by_quadrature((30, 80), 0.01)
     P = stress_second_moments(body.element_model.groups[0], slice(0, 1))[0]
     assert_allclose(P, np.hstack([D, third]), rtol=0, atol=1e-11 * E_1 * 0.02**3)

@@ -20,7 +20,7 @@ KINDS = ("quad", "triangle", "mixed")
 
 def ribbed_plate(kind, n, ribs=(("x", 0.3),)):
     """A plate of 2 n x 1.2 n cells, and the nodes of its ribs in order; "mixed" splits half of the quads at random."""
-    mesh = fm.flat_plate(A, B, 2 * n, 2 * round(0.6 * n), kind="triangle" if kind == "triangle" else "quad")
+    mesh = fm.shells.flat_plate(A, B, 2 * n, 2 * round(0.6 * n), kind="triangle" if kind == "triangle" else "quad")
     if kind == "mixed":
         quads = mesh.cells["quad"]
         split = np.random.default_rng(1).random(len(quads)) < 0.5
@@ -38,7 +38,7 @@ def with_beams(mesh, lines, bar):
     """The plate with beams on these lines."""
     ends = np.concatenate([np.stack([line[:-1], line[1:]], axis=1) for line in lines])
     mesh = replace(mesh, lines=ends, line_sets={"rib": np.arange(len(ends))})
-    return fm.shell_body(mesh, fm.ShellProperty(T, STEEL), name="plate", units=SI, stiffeners={"rib": bar})
+    return fm.shell_body(mesh, fm.shells.ShellProperty(T, STEEL), name="plate", units=SI, stiffeners={"rib": bar})
 
 
 def with_strips(mesh, lines, across, t, n_across=6):
@@ -60,8 +60,8 @@ def with_strips(mesh, lines, across, t, n_across=6):
         "plate": {kind: np.arange(len(rows)) for kind, rows in mesh.cells.items()},
         "rib": {"quad": np.arange(n_plate, len(quads))},
     }
-    whole = fm.ShellMesh(np.array(nodes), {**mesh.cells, "quad": quads}, cell_sets=sets)
-    properties = {"plate": fm.ShellProperty(T, STEEL), "rib": fm.ShellProperty(t, STEEL)}
+    whole = fm.shells.ShellMesh(np.array(nodes), {**mesh.cells, "quad": quads}, cell_sets=sets)
+    properties = {"plate": fm.shells.ShellProperty(T, STEEL), "rib": fm.shells.ShellProperty(t, STEEL)}
     return fm.shell_body(whole, properties, name="plate", units=SI)
 
 
@@ -77,7 +77,7 @@ def free_frequencies(body, k=8):
 
 def rib(**options):
     """A rectangle on end, its foot on the line."""
-    return fm.BeamProperty(fm.Rectangle(WIDTH, HEIGHT), STEEL, offset=(0.0, HEIGHT / 2), **options)
+    return fm.beams.BeamProperty(fm.beams.Rectangle(WIDTH, HEIGHT), STEEL, offset=(0.0, HEIGHT / 2), **options)
 
 
 #: both kinds of cells are in a mixed plate
@@ -106,7 +106,7 @@ def test_a_bar_beside_the_edge_converges_to_a_wider_plate(kind):
     width, t = 0.06, 0.008
     edge = (("x", 0.0),)
     wider = free_frequencies(with_strips(*ribbed_plate("quad", 20, edge), (0.0, -width, 0.0), t))
-    bar = fm.BeamProperty(fm.Rectangle(width, t), STEEL, offset=(-width / 2, 0.0))
+    bar = fm.beams.BeamProperty(fm.beams.Rectangle(width, t), STEEL, offset=(-width / 2, 0.0))
     assert_allclose(free_frequencies(with_beams(*ribbed_plate(kind, 20, edge), bar)), wider, rtol=0.005)
 
 
@@ -114,7 +114,7 @@ def test_a_bar_beside_the_edge_converges_to_a_wider_plate(kind):
 def test_a_rib_in_the_plane_of_a_wall_leaves_its_shear_free(kind):
     """Constant shear with a rib on the line v = x gamma: its axis turns with v,x, the wall by half of gamma."""
     mesh, lines = ribbed_plate(kind, 5)
-    body = with_beams(mesh, lines, fm.BeamProperty(fm.Rectangle(WIDTH, 0.02), STEEL))
+    body = with_beams(mesh, lines, fm.beams.BeamProperty(fm.beams.Rectangle(WIDTH, 0.02), STEEL))
     x = mesh.nodes[:, 0]
     u = np.zeros((len(x), 6))
     u[:, 1], u[:, 5] = 1e-3 * x, 0.5e-3
@@ -138,11 +138,11 @@ def test_plates_of_quads_and_triangles_pass_the_patch_test_of_constant_twist(pat
     """Inner nodes are in equilibrium; with different rotations on shared sides they would not be."""
     mesh, _ = ribbed_plate("mixed", 5)
     if pattern == "half":
-        quads = fm.flat_plate(A, B, 10, 6).cells["quad"]
+        quads = fm.shells.flat_plate(A, B, 10, 6).cells["quad"]
         split = quads.mean(axis=1) < len(mesh.nodes) / 2
         halves = np.concatenate([quads[split][:, [0, 1, 2]], quads[split][:, [0, 2, 3]]])
         mesh = replace(mesh, cells={"quad": quads[~split], "triangle": halves})
-    body = fm.shell_body(mesh, fm.ShellProperty(T, STEEL), name="plate", units=SI)
+    body = fm.shell_body(mesh, fm.shells.ShellProperty(T, STEEL), name="plate", units=SI)
     x, y, zero = mesh.nodes.T
     u = np.stack([zero, zero, x * y, x, -y, zero], axis=1)
     f = (body.K @ u.ravel()).reshape(-1, 6)
@@ -174,10 +174,10 @@ def test_sections_turn_with_the_node_at_interfaces_masses_and_where_a_line_leave
     mesh = replace(mesh, lines=ends, line_sets={"rib": np.arange(len(ends))})
     made = {"name": "plate", "units": SI, "stiffeners": {"rib": bar}}
     n = 6 * len(mesh.nodes)
-    assert fm.shell_body(mesh, fm.ShellProperty(T, STEEL), **made).n_dof == n + 7
-    root = fm.shell_interface(mesh, "root", fm.NodeSet("u0"))
-    mass = fm.PointMass(int(line[3]), 1.0)
-    held = fm.shell_body(mesh, fm.ShellProperty(T, STEEL), interfaces=[root], point_masses=[mass], **made)
+    assert fm.shell_body(mesh, fm.shells.ShellProperty(T, STEEL), **made).n_dof == n + 7
+    root = fm.shells.shell_interface(mesh, "root", fm.selections.NodeSet("u0"))
+    mass = fm.beams.PointMass(int(line[3]), 1.0)
+    held = fm.shell_body(mesh, fm.shells.ShellProperty(T, STEEL), interfaces=[root], point_masses=[mass], **made)
     assert held.n_dof == n + 5
     beyond = replace(
         mesh,
@@ -185,7 +185,7 @@ def test_sections_turn_with_the_node_at_interfaces_masses_and_where_a_line_leave
         lines=np.vstack([ends, [[line[-1], len(mesh.nodes)]]]),
         line_sets={"rib": np.arange(len(ends) + 1)},
     )
-    assert fm.shell_body(beyond, fm.ShellProperty(T, STEEL), **made).n_dof == n + 6 + 6
+    assert fm.shell_body(beyond, fm.shells.ShellProperty(T, STEEL), **made).n_dof == n + 6 + 6
 
 
 def held_at_its_edge(body, nodes):
@@ -204,9 +204,9 @@ def test_a_spinning_ribbed_plate_stiffens_as_with_a_strip_in_place_of_the_rib(ki
     mesh, (line,) = ribbed_plate(kind, 8)
     ends = np.stack([line[:-1], line[1:]], axis=1)
     mesh = replace(mesh, lines=ends, line_sets={"rib": np.arange(len(ends))})
-    root = fm.shell_interface(mesh, "root", fm.NodeSet("u0"), reference=(0.0, B / 2, 0.0))
+    root = fm.shells.shell_interface(mesh, "root", fm.selections.NodeSet("u0"), reference=(0.0, B / 2, 0.0))
     made = {"name": "plate", "units": SI, "stiffeners": {"rib": rib()}, "interfaces": [root]}
-    body = fm.shell_body(mesh, fm.ShellProperty(T, STEEL), **made)
+    body = fm.shell_body(mesh, fm.shells.ShellProperty(T, STEEL), **made)
     coupled = cms.couple(body)
     found = cms.reduce(coupled, cms.craig_bampton(coupled, n_modes=8), frame=cms.NodalFrame("root"), geometric=True)
     lowest = [np.argsort(np.diag(reduced.K))[:4] for reduced in (found, exact)]

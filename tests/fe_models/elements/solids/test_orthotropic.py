@@ -10,9 +10,11 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 from skfem.helpers import ddot, sym_grad
 
-from fe_models import AnisotropicMaterial, Material, OrthotropicMaterial, as_mesh, solid_body, unit_system
+from fe_models import Material, solid_body, unit_system
+from fe_models.body import AnisotropicMaterial, OrthotropicMaterial
 from fe_models.body.rigid_motion import MassLoads
 from fe_models.errors import MaterialError
+from fe_models.meshes import as_mesh
 from fe_models.meshes.boundary import boundary_nodes
 from fe_models.meshes.mesh import SOLID_TYPES
 from tests.bodies import STEEL, box_mesh, distorted

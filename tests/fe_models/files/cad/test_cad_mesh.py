@@ -5,8 +5,10 @@ import pytest
 import scipy.sparse.linalg as spl
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fe_models import FaceGroup, Material, MeshSize, mesh_cad, read_mesh, report_mesh, solid_body, unit_system
+from fe_models import Material, read_mesh, report_mesh, solid_body, unit_system
 from fe_models.errors import InterfaceError, MeshError
+from fe_models.files import MeshSize, mesh_cad
+from fe_models.selections import FaceGroup
 from tests.fe_models.small_solids import PLATE, PLATE_VOLUME, drawn, in_unit, plate_file
 
 STEEL = Material("steel", E=210000.0, nu=0.3, rho=7.85e-9)

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from fe_models import read_cad
 from fe_models.errors import MeshError
+from fe_models.files import read_cad
 from fe_models.files.cad.cad_faces import SAMPLES, _sampled
 from fe_models.files.cad.cad_units import length_unit
 from fe_models.files.cad.gmsh_model import gmsh_model

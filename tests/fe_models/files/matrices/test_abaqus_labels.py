@@ -30,7 +30,7 @@ def block(tmp_path_factory):
     for name in ("STIF1", "MASS1"):
         source = DATA / f"blockC3D10_{name}.mtx.gz"
         (folder / f"plain_{name}.mtx").write_bytes(gzip.decompress(source.read_bytes()))
-    plain = fe_models.read_matrices([folder / "plain_STIF1.mtx", folder / "plain_MASS1.mtx"])
+    plain = fe_models.files.read_matrices([folder / "plain_STIF1.mtx", folder / "plain_MASS1.mtx"])
     numbers = np.random.default_rng(2).permutation(257) * 7 + 7
     write_labelled(folder / "block_STIF1.mtx", plain.K, numbers)
     write_labelled(folder / "block_MASS1.mtx", plain.M, numbers)
@@ -39,9 +39,9 @@ def block(tmp_path_factory):
 
 def test_rows_find_their_nodes_to_the_last_bit(block):
     plain, numbers, paths = block
-    read = fe_models.read_matrices(paths)
-    geometry = replace(fe_models.read_geometry(DATA / "blockC3D10.inp"), node_numbers=numbers)
-    body = fe_models.body_from_foreign(read, geometry, name="block", units=fe_models.unit_system("m-kg-s"))
+    read = fe_models.files.read_matrices(paths)
+    geometry = replace(fe_models.files.read_geometry(DATA / "blockC3D10.inp"), node_numbers=numbers)
+    body = fe_models.files.body_from_foreign(read, geometry, name="block", units=fe_models.unit_system("m-kg-s"))
     order = 3 * body.dofs[:, 0] + body.dofs[:, 1]
     K = plain.K.toarray()
     lower = np.tril(K) + np.tril(K, -1).T
@@ -52,7 +52,7 @@ def test_rows_find_their_nodes_to_the_last_bit(block):
 def test_a_mass_that_lacks_rows_is_zero_there(tmp_path):
     (tmp_path / "a_STIF1.mtx").write_text("5,1, 5,1, 2.0\n9,1, 5,1, -1.0\n9,1, 9,1, 1.0\n9,6, 9,6, 4.0\n")
     (tmp_path / "a_MASS1.mtx").write_text("5,1, 5,1, 3.0\n9,1, 9,1, 3.0\n")
-    read = fe_models.read_matrices([tmp_path / "a_MASS1.mtx", tmp_path / "a_STIF1.mtx"])
+    read = fe_models.files.read_matrices([tmp_path / "a_MASS1.mtx", tmp_path / "a_STIF1.mtx"])
     assert_array_equal(read.dofs, [[5, 0], [9, 0], [9, 5]])
     assert_array_equal(read.M.toarray(), np.diag([3.0, 3.0, 0.0]))
     assert_array_equal(read.K.toarray(), [[2.0, -1.0, 0.0], [-1.0, 1.0, 0.0], [0.0, 0.0, 4.0]])
@@ -75,7 +75,7 @@ def test_a_damaged_file_is_refused(text, words, tmp_path):
     path = tmp_path / "a_STIF1.mtx"
     path.write_text(text)
     with pytest.raises(MatrixError, match=words):
-        fe_models.read_matrices(path)
+        fe_models.files.read_matrices(path)
 
 
 def test_files_of_two_models_do_not_mix(block, tmp_path):
@@ -83,4 +83,4 @@ def test_files_of_two_models_do_not_mix(block, tmp_path):
     other = tmp_path / "other_MASS1.mtx"
     other.write_text("9001,1, 9001,1, 3.0\n")
     with pytest.raises(MatrixError, match="the files name different dofs"):
-        fe_models.read_matrices([paths[0], other])
+        fe_models.files.read_matrices([paths[0], other])

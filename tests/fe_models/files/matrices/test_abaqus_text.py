@@ -35,7 +35,7 @@ def plain(path):
 
 
 def test_entries_are_those_of_the_file_to_the_last_bit(block):
-    read = fe_models.read_matrices(block)
+    read = fe_models.files.read_matrices(block)
     assert_array_equal(read.K.toarray(), plain(block[0]))
     assert_array_equal(read.M.toarray(), plain(block[1]))
     assert read.triangle == {"K": "both", "M": "both"}
@@ -47,7 +47,7 @@ def test_one_triangle_is_mirrored_and_said(block, tmp_path):
     lower = [line for line in lines if int(line.split()[0]) >= int(line.split()[1])]
     path = tmp_path / "half_STIF1.mtx"
     path.write_text("\n".join(lower) + "\n")
-    read = fe_models.read_matrices(path)
+    read = fe_models.files.read_matrices(path)
     assert_array_equal(read.K.toarray(), plain(block[0]))
     assert read.triangle == {"K": "lower"}
 
@@ -74,7 +74,7 @@ def test_a_damaged_file_is_refused_with_one_message(text, words, tmp_path):
     path = tmp_path / "model_STIF1.mtx"
     path.write_text(text)
     with pytest.raises(MatrixError) as caught:
-        fe_models.read_matrices(path)
+        fe_models.files.read_matrices(path)
     assert words in str(caught.value)
     assert "model_STIF1.mtx" in str(caught.value)
 
@@ -83,5 +83,5 @@ def test_a_file_that_does_not_say_which_matrix_it_holds_is_asked_for(tmp_path):
     path = tmp_path / "a.mtx"
     path.write_text("1 1 2.0\n2 2 3.0\n")
     with pytest.raises(MatrixError, match="is this the stiffness, the mass or the damping"):
-        fe_models.read_matrices(path)
-    assert fe_models.read_matrices({"M": path}).triangle == {"M": "diagonal"}
+        fe_models.files.read_matrices(path)
+    assert fe_models.files.read_matrices({"M": path}).triangle == {"M": "diagonal"}

@@ -28,17 +28,17 @@ def read(tmp_path_factory):
     for name in ("blockC3D10_STIF1.mtx", "blockC3D10_MASS1.mtx"):
         paths.append(folder / name)
         paths[-1].write_bytes(gzip.decompress((DATA / f"{name}.gz").read_bytes()))
-    return fe_models.read_matrices(paths)
+    return fe_models.files.read_matrices(paths)
 
 
 @pytest.fixture(scope="module")
 def geometry():
-    return fe_models.read_geometry(DATA / "blockC3D10.inp")
+    return fe_models.files.read_geometry(DATA / "blockC3D10.inp")
 
 
 @pytest.fixture(scope="module")
 def block(read, geometry):
-    return fe_models.body_from_foreign(read, geometry, name="block", units=SI)
+    return fe_models.files.body_from_foreign(read, geometry, name="block", units=SI)
 
 
 @pytest.fixture(scope="module")
@@ -105,8 +105,8 @@ def penalised(read, rows):
 def test_supports_are_refused_by_default_and_removed_on_request(read, geometry, block):
     held = penalised(read, [0, 1, 2, 4, 30])
     with pytest.raises(BodyError, match="support by penalty"):
-        fe_models.body_from_foreign(held, geometry, name="block", units=SI)
-    body = fe_models.body_from_foreign(held, geometry, name="block", units=SI, remove_supports=True)
+        fe_models.files.body_from_foreign(held, geometry, name="block", units=SI)
+    body = fe_models.files.body_from_foreign(held, geometry, name="block", units=SI, remove_supports=True)
     assert_allclose(body.K.toarray(), block.K.toarray(), rtol=0, atol=1e-14 * np.abs(block.K).max())
     assert "supports of 3 nodes were removed" in body.provenance["notes"]
 
@@ -117,13 +117,13 @@ def test_springs_to_the_ground_are_labelled_or_removed(read, geometry, block):
         K[row, row] += 1e7
     sprung = replace(read, K=sp.csc_array(K))
     with pytest.raises(BodyError, match="if it is meant to be held"):
-        fe_models.body_from_foreign(sprung, geometry, name="block", units=SI)
-    assert fe_models.body_from_foreign(sprung, geometry, name="block", units=SI, held=True).is_held
-    free = fe_models.body_from_foreign(sprung, geometry, name="block", units=SI, remove_supports=True)
+        fe_models.files.body_from_foreign(sprung, geometry, name="block", units=SI)
+    assert fe_models.files.body_from_foreign(sprung, geometry, name="block", units=SI, held=True).is_held
+    free = fe_models.files.body_from_foreign(sprung, geometry, name="block", units=SI, remove_supports=True)
     assert not free.is_held
     assert_allclose(free.K.toarray(), block.K.toarray(), rtol=0, atol=1e-14 * np.abs(block.K).max())
     with pytest.raises(MatrixError, match="there are no supports to remove"):
-        fe_models.body_from_foreign(read, geometry, name="block", units=SI, remove_supports=True)
+        fe_models.files.body_from_foreign(read, geometry, name="block", units=SI, remove_supports=True)
 
 
 def test_rows_that_the_other_program_took_out_hold_the_body(read, geometry):
@@ -132,12 +132,12 @@ def test_rows_that_the_other_program_took_out_hold_the_body(read, geometry):
     kept = np.setdiff1d(np.arange(3 * n_nodes), np.flatnonzero(np.isin(dofs[:, 0], [1, 2, 3, 4])))
     cut = replace(read, K=read.K[kept][:, kept], M=read.M[kept][:, kept], dofs=dofs[kept])
     with pytest.raises(BodyError, match="rows that other nodes have are missing"):
-        fe_models.body_from_foreign(cut, geometry, name="block", units=SI)
-    assert fe_models.body_from_foreign(cut, geometry, name="block", units=SI, held=True).is_held
+        fe_models.files.body_from_foreign(cut, geometry, name="block", units=SI)
+    assert fe_models.files.body_from_foreign(cut, geometry, name="block", units=SI, held=True).is_held
     with pytest.raises(MatrixError, match="still not free"):
-        fe_models.body_from_foreign(cut, geometry, name="block", units=SI, remove_supports=True)
+        fe_models.files.body_from_foreign(cut, geometry, name="block", units=SI, remove_supports=True)
     rows = np.setdiff1d(np.arange(3 * n_nodes), kept)
-    said = fe_models.body_from_foreign(
+    said = fe_models.files.body_from_foreign(
         replace(read, dofs=dofs, constrained=rows), geometry, name="block", units=SI, held=True
     )
     assert_array_equal(said.K.toarray(), read.K.toarray()[np.ix_(kept, kept)])
@@ -145,7 +145,7 @@ def test_rows_that_the_other_program_took_out_hold_the_body(read, geometry):
     zeroed[np.isin(dofs[:, 0], [1, 2, 3, 4])] = 0.0
     Z = sp.diags_array(zeroed)
     same = replace(read, K=Z @ read.K @ Z, M=Z @ read.M @ Z)
-    body = fe_models.body_from_foreign(same, geometry, name="block", units=SI, held=True)
+    body = fe_models.files.body_from_foreign(same, geometry, name="block", units=SI, held=True)
     assert body.n_dof == len(kept)
     assert "12 rows without stiffness and mass" in body.provenance["notes"]
 
@@ -154,7 +154,7 @@ def test_rows_in_another_order_are_found_by_the_gate(read, geometry):
     order = np.arange(read.n_dof).reshape(-1, 3).T.ravel()
     swapped = replace(read, K=read.K[order][:, order], M=read.M[order][:, order])
     with pytest.raises(BodyError, match="rows are in component-major order"):
-        fe_models.body_from_foreign(swapped, geometry, name="block", units=SI)
+        fe_models.files.body_from_foreign(swapped, geometry, name="block", units=SI)
 
 
 @pytest.mark.parametrize(
@@ -169,19 +169,19 @@ def test_rows_in_another_order_are_found_by_the_gate(read, geometry):
 )
 def test_what_does_not_fit_is_refused(read, geometry, change, words):
     with pytest.raises(MatrixError, match=words):
-        fe_models.body_from_foreign(replace(read, **change), geometry, name="block", units=SI)
+        fe_models.files.body_from_foreign(replace(read, **change), geometry, name="block", units=SI)
 
 
 def test_without_geometry_the_nodes_are_asked_for(read):
     with pytest.raises(MatrixError, match=r'geometry = "model\.inp"'):
-        fe_models.body_from_foreign(read, name="block", units=SI)
+        fe_models.files.body_from_foreign(read, name="block", units=SI)
 
 
 def test_gaps_in_the_numbers_leave_the_rows_without_names(read, geometry):
     numbers = geometry.node_numbers.copy()
     numbers[-1] += 1
     with pytest.raises(MatrixError, match="numbered 1 to 258 with gaps"):
-        fe_models.body_from_foreign(read, replace(geometry, node_numbers=numbers), name="block", units=SI)
+        fe_models.files.body_from_foreign(read, replace(geometry, node_numbers=numbers), name="block", units=SI)
 
 
 def test_dofs_in_local_axes_are_turned_back(read, geometry, block):

@@ -35,8 +35,8 @@ def printed_frequencies(text):
 
 
 def body_of(paths, deck, **options):
-    return fe_models.body_from_foreign(
-        fe_models.read_matrices(paths), fe_models.read_geometry(deck), name="bar", units=SI, **options
+    return fe_models.files.body_from_foreign(
+        fe_models.files.read_matrices(paths), fe_models.files.read_geometry(deck), name="bar", units=SI, **options
     )
 
 
@@ -80,29 +80,29 @@ def test_a_body_whose_supports_were_taken_out_of_the_rows_is_held(tmp_path):
 def test_a_list_of_dofs_that_does_not_fit_is_refused(tmp_path):
     stiffness, mass, _ = unpack("bar", tmp_path)
     with pytest.raises(MatrixError, match="expected a list of 96 dofs, one for each row, got 72"):
-        fe_models.read_matrices([stiffness, mass, DATA / "bar_held.dof"])
+        fe_models.files.read_matrices([stiffness, mass, DATA / "bar_held.dof"])
     with pytest.raises(MatrixError, match="numbered 5 to 315 with gaps"):
         body_of([stiffness, mass], DATA / "bar.inp")
     wrong = tmp_path / "wrong.dof"
     wrong.write_text("5.1\n5.7\n")
     with pytest.raises(MatrixError, match=r"line 2: expected node\.component"):
-        fe_models.read_matrices([stiffness, mass, wrong])
+        fe_models.files.read_matrices([stiffness, mass, wrong])
 
 
 def test_the_stiffness_alone_brings_mass_and_dofs_from_beside_it_and_says_so(tmp_path):
     stiffness, mass, dofs = unpack("bar", tmp_path)
     shutil.copy(dofs, tmp_path)
-    alone, named = fe_models.read_matrices(stiffness), fe_models.read_matrices([stiffness, mass, dofs])
+    alone, named = fe_models.files.read_matrices(stiffness), fe_models.files.read_matrices([stiffness, mass, dofs])
     assert_array_equal(alone.M.toarray(), named.M.toarray())
     assert_array_equal(alone.dofs, named.dofs)
     assert "bar.mas taken from beside the named files" in alone.notes
     assert "bar.dof taken from beside the named files" in alone.notes
     assert sorted(Path(path).name for path in alone.files) == ["bar.dof", "bar.mas", "bar.sti"]
     other = mass.rename(tmp_path / "other.mas")
-    chosen = fe_models.read_matrices([stiffness, other])
+    chosen = fe_models.files.read_matrices([stiffness, other])
     assert chosen.dofs is None
     assert not chosen.notes
-    assert fe_models.read_matrices({"K": stiffness}).dofs is None
+    assert fe_models.files.read_matrices({"K": stiffness}).dofs is None
 
 
 def test_nodes_that_are_not_in_the_deck_are_named(tmp_path):
@@ -115,8 +115,8 @@ def test_nodes_that_are_not_in_the_deck_are_named(tmp_path):
 
 def test_rows_and_triangle_of_a_substructure_are_those_of_the_whole(tmp_path):
     """CalculiX 2.20 writes the block K_bb of the retained dofs of this deck, not condensed: which shows their order."""
-    whole = fe_models.read_matrices(unpack("bar", tmp_path))
-    part = fe_models.read_matrices(DATA / "bar_sub.mtx")
+    whole = fe_models.files.read_matrices(unpack("bar", tmp_path))
+    part = fe_models.files.read_matrices(DATA / "bar_sub.mtx")
     key = {(node, component): row for row, (node, component) in enumerate(whole.dofs.tolist())}
     b = [key[node, component] for node, component in part.dofs.tolist()]
     assert len(b) == 40
@@ -127,7 +127,7 @@ def test_rows_and_triangle_of_a_substructure_are_those_of_the_whole(tmp_path):
 
 def test_a_condensed_substructure_of_abaqus_layout_is_a_free_body(tmp_path):
     """Both matrices, two nodes with all dofs and one with other ones, four numbers to a line: written here."""
-    whole = fe_models.read_matrices(unpack("bar", tmp_path))
+    whole = fe_models.files.read_matrices(unpack("bar", tmp_path))
     ends = [205, 215, 5, 35, 225, 305]
     b = np.concatenate([np.flatnonzero(whole.dofs[:, 0] == node) for node in ends])
     i = np.setdiff1d(np.arange(whole.n_dof), b)
@@ -166,7 +166,7 @@ def test_a_damaged_substructure_is_refused(change, words, tmp_path):
     path = tmp_path / "sub.mtx"
     path.write_text(change((DATA / "bar_sub.mtx").read_text()))
     with pytest.raises(MatrixError, match=words):
-        fe_models.read_matrices(path)
+        fe_models.files.read_matrices(path)
 
 
 @pytest.mark.external

@@ -43,7 +43,7 @@ def damaged(data, rng):
 def outcome(path):
     """Read a file: the message, "" if there is none, and the number of rows."""
     try:
-        return "", fe_models.read_matrices(path).n_dof or 0
+        return "", fe_models.files.read_matrices(path).n_dof or 0
     except FeModelsError as error:
         return str(error), 0
 

@@ -50,14 +50,14 @@ def market(tmp_path):
 
 @pytest.mark.parametrize("rows", ["nodes.txt", "rows.txt", "pairs.txt"])
 def test_a_matrix_market_pair_with_the_nodes_of_its_rows(market, rows):
-    read = fe_models.read_matrices([market / "K.mtx", market / "M.mtx", market / rows])
+    read = fe_models.files.read_matrices([market / "K.mtx", market / "M.mtx", market / rows])
     same(read)
     assert read.triangle == {"K": "lower", "M": "diagonal"}
 
 
 @pytest.mark.parametrize(("name", "kind"), [("general.mtx", "both"), ("dense.mtx", "lower"), ("whole.mtx", "both")])
 def test_every_form_of_a_matrix_market_file_is_read(market, name, kind):
-    read = fe_models.read_matrices({"K": market / name, "M": market / "M.mtx"})
+    read = fe_models.files.read_matrices({"K": market / name, "M": market / "M.mtx"})
     same(read, dofs=False)
     assert read.triangle["K"] == kind
 
@@ -65,7 +65,7 @@ def test_every_form_of_a_matrix_market_file_is_read(market, name, kind):
 def test_an_upper_triangle_under_a_symmetric_header_is_mirrored_too(tmp_path):
     text = "%%MatrixMarket matrix coordinate real symmetric\n% of another program\n2 2 3\n1 1 2.0\n1 2 -1.0\n2 2 2.0\n"
     (tmp_path / "K.mtx").write_text(text)
-    read = fe_models.read_matrices(tmp_path / "K.mtx")
+    read = fe_models.files.read_matrices(tmp_path / "K.mtx")
     assert_array_equal(read.K.toarray(), [[2.0, -1.0], [-1.0, 2.0]])
     assert read.triangle == {"K": "upper"}
 
@@ -94,17 +94,17 @@ BANNER = "%%MatrixMarket matrix coordinate real symmetric\n"
 def test_what_is_wrong_with_a_matrix_market_file_is_said(text, words, tmp_path):
     (tmp_path / "K.mtx").write_text(text)
     with pytest.raises(MatrixError) as caught:
-        fe_models.read_matrices(tmp_path / "K.mtx")
+        fe_models.files.read_matrices(tmp_path / "K.mtx")
     assert words in str(caught.value)
 
 
 def test_a_list_of_nodes_has_to_fit(market):
     write_list(market / "three.txt", np.array([[1.0], [2.0], [3.0]]))
     with pytest.raises(MatrixError, match="expected 3 or 6 of 12 rows to each node of the list, got 3 nodes"):
-        fe_models.read_matrices([market / "K.mtx", market / "M.mtx", market / "three.txt"])
+        fe_models.files.read_matrices([market / "K.mtx", market / "M.mtx", market / "three.txt"])
     write_list(market / "odd.txt", np.array([[1.0], [1.0], [3.0]]))
     with pytest.raises(MatrixError, match="expected each node 3 or 6 times"):
-        fe_models.read_matrices([market / "K.mtx", market / "M.mtx", market / "odd.txt"])
+        fe_models.files.read_matrices([market / "K.mtx", market / "M.mtx", market / "odd.txt"])
 
 
 # MATLAB
@@ -136,7 +136,7 @@ CONTENT = {"K": K, "M": M, "dofs": COUNTED, "nodes": np.column_stack([NUMBERS, N
 def test_a_matlab_file_brings_matrices_dofs_and_nodes(write, tmp_path):
     path = tmp_path / "model.mat"
     write(path, CONTENT)
-    read = fe_models.read_matrices(path)
+    read = fe_models.files.read_matrices(path)
     same(read)
     assert_array_equal(read.nodes, NODES)
     assert_array_equal(read.node_numbers, NUMBERS)
@@ -159,7 +159,7 @@ def test_what_is_wrong_with_a_matlab_file_is_said(write, change, words, tmp_path
     path = tmp_path / "model.mat"
     write(path, CONTENT | change)
     with pytest.raises(MatrixError) as caught:
-        fe_models.read_matrices(path)
+        fe_models.files.read_matrices(path)
     assert words in str(caught.value)
 
 
@@ -167,10 +167,10 @@ def test_matrices_by_other_names_are_asked_for(tmp_path):
     path = tmp_path / "model.mat"
     scipy.io.savemat(path, {"Ksys": K, "Msys": M})
     with pytest.raises(MatrixError, match="say which is which"):
-        fe_models.read_matrices(path)
-    same(fe_models.read_matrices(path, names={"K": "Ksys", "M": "Msys"}), dofs=False)
+        fe_models.files.read_matrices(path)
+    same(fe_models.files.read_matrices(path, names={"K": "Ksys", "M": "Msys"}), dofs=False)
     with pytest.raises(MatrixError, match="did you mean 'Ksys'"):
-        fe_models.read_matrices(path, names={"K": "Ksis"})
+        fe_models.files.read_matrices(path, names={"K": "Ksis"})
 
 
 def test_a_matlab_file_that_claims_more_than_it_has_is_refused(tmp_path):
@@ -178,7 +178,7 @@ def test_a_matlab_file_that_claims_more_than_it_has_is_refused(tmp_path):
     with h5py.File(path, "w", userblock_size=512) as file:
         file.create_dataset("K", shape=(10**6, 10**6), dtype=float, chunks=(100, 100))
     with pytest.raises(MatrixError, match="K claims 8000000000000 bytes and has 0"):
-        fe_models.read_matrices(path)
+        fe_models.files.read_matrices(path)
 
 
 @pytest.mark.parametrize("write", [scipy.io.savemat, matlab_7])
@@ -187,7 +187,7 @@ def test_a_truncated_matlab_file_is_one_message(write, tmp_path):
     write(path, CONTENT)
     path.write_bytes(path.read_bytes()[:-700])
     with pytest.raises(MatrixError, match=r"model\.mat"):
-        fe_models.read_matrices(path)
+        fe_models.files.read_matrices(path)
 
 
 # SciPy, NumPy, Harwell-Boeing
@@ -197,11 +197,11 @@ def test_archives_of_scipy_and_numpy(tmp_path):
     sp.save_npz(tmp_path / "K.npz", K)
     sp.save_npz(tmp_path / "mass.npz", sp.coo_array(M))
     np.savez(tmp_path / "both.npz", K=K.toarray(), M=M.toarray(), dofs=COUNTED)
-    same(fe_models.read_matrices([tmp_path / "K.npz", tmp_path / "mass.npz"]), dofs=False)
-    same(fe_models.read_matrices(tmp_path / "both.npz"))
+    same(fe_models.files.read_matrices([tmp_path / "K.npz", tmp_path / "mass.npz"]), dofs=False)
+    same(fe_models.files.read_matrices(tmp_path / "both.npz"))
     np.savez(tmp_path / "K.npz", K=np.array([{}], dtype=object))
     with pytest.raises(MatrixError, match="it is damaged or of another kind"):
-        fe_models.read_matrices(tmp_path / "K.npz")
+        fe_models.files.read_matrices(tmp_path / "K.npz")
 
 
 def test_an_archive_that_claims_more_than_it_has_is_refused(tmp_path):
@@ -221,7 +221,7 @@ def test_an_archive_that_claims_more_than_it_has_is_refused(tmp_path):
             np.save(out, value)
             archive.writestr(f"{name}.npy", buffer.getvalue() if name == "data" else out.getvalue())
     with pytest.raises(MatrixError, match=r"K\.npz"):
-        fe_models.read_matrices(tmp_path / "K.npz")
+        fe_models.files.read_matrices(tmp_path / "K.npz")
 
 
 def harwell_boeing(path, A, kind="RSA"):
@@ -249,7 +249,7 @@ def harwell_boeing(path, A, kind="RSA"):
 def test_harwell_boeing_files(kind, tmp_path):
     harwell_boeing(tmp_path / "K.rsa", K, kind)
     harwell_boeing(tmp_path / "mass.hb", M, kind)
-    read = fe_models.read_matrices([tmp_path / "K.rsa", tmp_path / "mass.hb"])
+    read = fe_models.files.read_matrices([tmp_path / "K.rsa", tmp_path / "mass.hb"])
     same(read, dofs=False)
     assert read.triangle["K"] == ("lower" if kind == "RSA" else "both")
 
@@ -260,10 +260,10 @@ def test_what_is_wrong_with_a_harwell_boeing_file_is_said(tmp_path):
     text = path.read_text()
     path.write_text(text.replace("RSA", "CSA"))
     with pytest.raises(MatrixError, match="expected a real, assembled matrix"):
-        fe_models.read_matrices(path)
+        fe_models.files.read_matrices(path)
     path.write_text(text.replace(f"{12:14d}{12:14d}", f"{12:14d}{10**13:14d}"))
     with pytest.raises(MatrixError, match="expected rows, columns, entries"):
-        fe_models.read_matrices(path)
+        fe_models.files.read_matrices(path)
     path.write_text(text[:-200])
     with pytest.raises(MatrixError, match=r"K\.rsa"):
-        fe_models.read_matrices(path)
+        fe_models.files.read_matrices(path)

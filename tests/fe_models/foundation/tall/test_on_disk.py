@@ -76,9 +76,9 @@ def test_a_body_reduced_from_disk_is_the_one_reduced_in_memory(tiny):
     for to_disk in (False, True):
         with Families(body, to_disk=to_disk) as families:
             modes = cms.craig_bampton(families, 4)
-            states = cms.unit_states(families)
+            states = cms.reduction.unit_states(families)
         assert is_on_disk(modes.columns) == to_disk
-        few = cms.with_characteristic_modes(modes, body, 3)
+        few = cms.modes.with_characteristic_modes(modes, body, 3)
         made.append((cms.reduce(body, modes, geometric=states), cms.reduce(body, few, geometric=states)))
     assert is_on_disk(made[1][0].stress)
     for inside, outside in zip(*made, strict=True):

@@ -4,23 +4,14 @@ import pytest
 import skfem
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fe_models import (
-    FaceGroup,
-    Material,
-    Plane,
-    ShellProperty,
-    as_line_mesh,
-    as_mesh,
-    as_shell_mesh,
-    report_mesh,
-    rigid_interface,
-    shell_body,
-    solid_body,
-    unit_system,
-)
+from fe_models import Material, report_mesh, rigid_interface, shell_body, solid_body, unit_system
+from fe_models.beams import as_line_mesh
 from fe_models.errors import MeshError
+from fe_models.meshes import as_mesh
 from fe_models.meshes.mesh import SOLID_TYPES
 from fe_models.meshes.objects.as_mesh import VTK_TYPES
+from fe_models.selections import FaceGroup, Plane
+from fe_models.shells import ShellProperty, as_shell_mesh
 from tests.bodies import box_mesh
 
 SI = unit_system("m-kg-s")

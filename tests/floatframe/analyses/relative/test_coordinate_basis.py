@@ -8,17 +8,8 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import block_diag
 
-from floatframe import (
-    Channel,
-    FlexibleBody,
-    Marker,
-    ModelError,
-    linearize,
-    named_state_space,
-    static_equilibrium,
-    steady_rotation,
-    system_modes,
-)
+from floatframe import FlexibleBody, Marker, linearize, static_equilibrium, system_modes
+from floatframe.analyses import named_state_space, steady_rotation
 from floatframe.analyses.relative.coordinate_basis import coordinate_names, dependent_coordinates
 from floatframe.components.mechanisms import slider_crank
 from floatframe.engine.compiling.file_frames import motion_of_engine, small_motions_of_file
@@ -29,8 +20,10 @@ from floatframe.engine.tree.kernels.entry import motion_of_joints, newton_matrix
 from floatframe.engine.tree.kernels.tree import new_joint_work
 from floatframe.engine.tree.topology import tree_of
 from floatframe.engine.tree.tree_motions import coordinate_motions
+from floatframe.errors import ModelError
 from floatframe.model.functions.time_functions import polynomial_of_time
 from floatframe.results.small_motions.joint_rates import coordinate_rows
+from floatframe.sensors import Channel
 from tests.floatframe.analyses.relative.examples import CASES
 
 

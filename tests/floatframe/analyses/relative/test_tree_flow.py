@@ -8,8 +8,6 @@ from numpy.testing import assert_allclose
 
 from floatframe import (
     GROUND,
-    Bushing,
-    ConvergenceError,
     Gravity,
     JointForce,
     Marker,
@@ -17,13 +15,14 @@ from floatframe import (
     RigidBody,
     SphericalJoint,
     System,
-    joint_coordinate,
-    snapshot,
     static_equilibrium,
-    steady_rotation,
 )
+from floatframe.analyses import snapshot, steady_rotation
 from floatframe.engine.tree.topology import tree_of
+from floatframe.errors import ConvergenceError
+from floatframe.forces import Bushing
 from floatframe.model.rotations import euler_parameters_of_rotation_vector
+from floatframe.results import joint_coordinate
 from tests.floatframe.analyses.relative.examples import CASES
 from tests.floatframe.engine.tree.mechanisms import MECHANISMS, falling
 from tests.floatframe.model.elements.laws import Jack

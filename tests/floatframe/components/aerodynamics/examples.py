@@ -16,6 +16,6 @@ def surface(**changes):
 
 def glider(**changes):
     body = ff.RigidBody("glider", 500.0, np.eye(3), velocity=(30.0, 0, -1.0))
-    level = ff.ConstantOrientation("level", ff.Marker("ground"), ff.Marker("glider"))
+    level = ff.joints.ConstantOrientation("level", ff.Marker("ground"), ff.Marker("glider"))
     wing = surface(factor=smooth_step(0.5, 1.0, 1.0, 0.2), zero_lift=polynomial_of_time([-0.1, 0.02]), **changes)
     return ff.System([body], [level], [ff.Gravity((0, 0, -9.81))], elements=[wing])

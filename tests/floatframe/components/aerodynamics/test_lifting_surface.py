@@ -44,7 +44,7 @@ def test_lift_stays_beyond_its_largest_coefficient_and_there_is_none_at_rest():
 
 def test_a_body_that_keeps_level_glides_as_scipy_says_while_its_lift_fades():
     system = glider()
-    assert ff.check_element(system, "wing").findings == ()
+    assert ff.analyses.check_element(system, "wing").findings == ()
     motion = ff.integrate(system, ff.GeneralizedAlpha(0.9, 1e-11), 1.5, 1e-3)
 
     def rates(t, y):
@@ -72,5 +72,5 @@ def test_a_body_that_keeps_level_glides_as_scipy_says_while_its_lift_fades():
     ],
 )
 def test_numbers_out_of_their_range_are_refused(changes, message):
-    with pytest.raises(ff.ModelError, match=message):
+    with pytest.raises(ff.errors.ModelError, match=message):
         LiftingSurface("wing", **({"marker": WING} | NUMBERS | changes))

@@ -4,22 +4,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import (
-    GROUND,
-    GeneralizedAlpha,
-    Marker,
-    ModelError,
-    PlanarJoint,
-    RelativeGeneralizedAlpha,
-    RigidBody,
-    System,
-    element_motion,
-    integrate,
-    linearize,
-    read_system,
-)
+from floatframe import GROUND, GeneralizedAlpha, Marker, RigidBody, System, integrate, linearize, read_system
 from floatframe.components.bearings import Bearing
+from floatframe.errors import ModelError
+from floatframe.integrators import RelativeGeneralizedAlpha
+from floatframe.joints import PlanarJoint
 from floatframe.model.rotations import euler_parameters, rotation_exp
+from floatframe.results import element_motion
 from tests.floatframe.element_laws import power_defect
 from tests.floatframe.finite_differences import assert_tangent_is_exact
 from tests.floatframe.laws.contacts import FORMS

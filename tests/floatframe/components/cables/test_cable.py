@@ -9,16 +9,16 @@ from floatframe import (
     GeneralizedAlpha,
     Gravity,
     Marker,
-    ModelError,
     PrismaticJoint,
     RigidBody,
     System,
-    element_motion,
     integrate,
     read_system,
     static_equilibrium,
 )
 from floatframe.components.cables import Cable
+from floatframe.errors import ModelError
+from floatframe.results import element_motion
 from floatframe.results.energy_balance import balance_defect
 from tests.floatframe.components.cables.examples import G, jumper
 from tests.floatframe.finite_differences import assert_tangent_is_exact

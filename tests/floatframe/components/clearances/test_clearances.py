@@ -11,19 +11,19 @@ from floatframe import (
     GeneralizedAlpha,
     Gravity,
     Marker,
-    ModelError,
     PointForce,
     PrismaticJoint,
     RevoluteJoint,
     RigidBody,
     System,
-    check_element,
-    element_motion,
     integrate,
     static_equilibrium,
 )
+from floatframe.analyses import check_element
 from floatframe.components.clearances import Backlash, BallWithPlay, HingeWithPlay
+from floatframe.errors import ModelError
 from floatframe.model.elements import Placed
+from floatframe.results import element_motion
 from floatframe.results.energy_balance import balance_defect
 from tests.floatframe.components.clearances.examples import ARM, NUMBERS, PLAY, START, G, J, M, pendulum
 from tests.floatframe.finite_differences import assert_tangent_is_exact

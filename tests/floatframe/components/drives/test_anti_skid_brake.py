@@ -4,13 +4,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import (
-    GeneralizedAlpha,
-    check_element,
-    element_motion,
-    integrate,
-)
+from floatframe import GeneralizedAlpha, integrate
+from floatframe.analyses import check_element
 from floatframe.errors import ModelError
+from floatframe.results import element_motion
 from tests.floatframe.components.drives.anti_skid_brake_examples import J, R, bench, brake
 from tests.floatframe.element_laws import evaluate, marker_motion, placed
 

@@ -6,19 +6,12 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from floatframe import (
-    GeneralizedAlpha,
-    PrismaticJoint,
-    RevoluteJoint,
-    RigidBody,
-    System,
-    check_element,
-    element_motion,
-    integrate,
-)
+from floatframe import GeneralizedAlpha, PrismaticJoint, RevoluteJoint, RigidBody, System, integrate
+from floatframe.analyses import check_element
 from floatframe.components.drives import Pid, PidDrive, SpeedControl, TorqueMap
 from floatframe.errors import ModelError
 from floatframe.model.functions.time_functions import constant, harmonic
+from floatframe.results import element_motion
 from tests.floatframe.components.drives.controllers_examples import A, B, J, every_drive, turned
 from tests.floatframe.element_laws import evaluate, marker_motion, placed
 from tests.floatframe.finite_differences import assert_tangent_is_exact

@@ -6,10 +6,11 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from floatframe import GROUND, GeneralizedAlpha, Marker, RevoluteJoint, RigidBody, System, element_motion, integrate
+from floatframe import GROUND, GeneralizedAlpha, Marker, RevoluteJoint, RigidBody, System, integrate
 from floatframe.components.drives import DcMotor, Pid
 from floatframe.errors import ModelError
 from floatframe.model.functions.time_functions import harmonic
+from floatframe.results import element_motion
 from tests.floatframe.element_laws import marker_motion, placed, power_defect
 
 J, R, L, K, D, U = 2e-3, 0.5, 2e-5, 0.05, 1e-4, 24.0

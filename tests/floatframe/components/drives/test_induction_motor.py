@@ -5,20 +5,11 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
-from floatframe import (
-    GROUND,
-    GeneralizedAlpha,
-    Marker,
-    PointForce,
-    RevoluteJoint,
-    RigidBody,
-    System,
-    element_motion,
-    integrate,
-)
+from floatframe import GROUND, GeneralizedAlpha, Marker, PointForce, RevoluteJoint, RigidBody, System, integrate
 from floatframe.components.drives import InductionMotor
 from floatframe.errors import ModelError
 from floatframe.model.functions.time_functions import piecewise, polynomial_of_time, smooth_step
+from floatframe.results import element_motion
 from tests.floatframe.element_laws import evaluate, marker_motion, placed, power_defect
 
 A, B = Marker("ground"), Marker("rotor")

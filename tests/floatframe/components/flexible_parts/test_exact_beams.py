@@ -12,18 +12,10 @@ import cms
 import fe_models as fm
 from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.elements.beams.element import local_stiffness, shear_parameter, stiffness_about_shear_center
-from floatframe import (
-    GROUND,
-    FixedJoint,
-    GeneralizedAlpha,
-    ModelError,
-    PointForce,
-    System,
-    exact_beams,
-    integrate,
-    static_equilibrium,
-)
+from floatframe import GROUND, FixedJoint, GeneralizedAlpha, PointForce, System, integrate, static_equilibrium
+from floatframe.components import exact_beams
 from floatframe.components.flexible_parts.exact_beams import piece_stiffness
+from floatframe.errors import ModelError
 from floatframe.model.functions.time_functions import piecewise, polynomial_of_time
 from floatframe.model.rotations import tilde
 from floatframe.results.place_motion import point_motion
@@ -38,9 +30,9 @@ SI = cms.unit_system("m-kg-s")
 def body_of(nodes, section, material):
     """Return a chain of lines through points, with interfaces at both ends."""
     n = len(nodes) - 1
-    mesh = fm.LineMesh(np.asarray(nodes, float), np.column_stack([np.arange(n), np.arange(1, n + 1)]))
-    ends = [fm.line_interface(mesh, name, fm.NodeIndices((k,))) for name, k in (("root", 0), ("tip", n))]
-    item = fm.BeamProperty(section, material)
+    mesh = fm.beams.LineMesh(np.asarray(nodes, float), np.column_stack([np.arange(n), np.arange(1, n + 1)]))
+    ends = [fm.beams.line_interface(mesh, name, fm.beams.NodeIndices((k,))) for name, k in (("root", 0), ("tip", n))]
+    item = fm.beams.BeamProperty(section, material)
     return fm.beam_body(mesh, item, name="beam", units=SI, interfaces=ends)
 
 
@@ -63,7 +55,7 @@ def bent(part, steps=30, **load):
 def test_a_cantilever_is_rolled_up_to_a_circle():
     """M = 2 pi EI / L: the tip is back at the root, turned once, whatever the division: its elements bend exactly."""
     soft = fm.Material("soft", E=2e7, nu=0.25, rho=1000.0)
-    part = exact_beams("beam", straight(2, 1.0, fm.Rectangle(0.1, 0.1), soft), pieces=4)
+    part = exact_beams("beam", straight(2, 1.0, fm.beams.Rectangle(0.1, 0.1), soft), pieces=4)
     tip, p = bent(part, steps=5, torque=(0, 0, 2 * np.pi * 2e7 * 0.1**4 / 12))
     assert_allclose(tip, 0, rtol=0, atol=1e-10)
     assert_allclose(np.abs(p[0]), 1, rtol=1e-10)
@@ -99,7 +91,7 @@ def rod(tip_force):
 
 def test_the_45_degree_bend():
     """Bathe & Bolourchi's bend under 600 across its plane, half of its radius: errors fall with the square."""
-    section = fm.GeneralSection(A=1.0, Iy=1 / 12, Iz=1 / 12, J=1 / 6, A_sy=5 / 6, A_sz=5 / 6)
+    section = fm.beams.GeneralSection(A=1.0, Iy=1 / 12, Iz=1 / 12, J=1 / 6, A_sy=5 / 6, A_sz=5 / 6)
     material = fm.Material("bend", E=E, nu=0.0, rho=1e-3)
     force, found = np.array([0, 0, 600.0]), []
     for n in (6, 12):
@@ -128,7 +120,7 @@ def test_a_free_beam_tumbles_as_another_exact_beam_does():
 
     exact = integrate_exact(Problem(beam.mass(), beam.force, beam.x0, load=load), t_end, t_end / n_steps, rho_inf=0.8)
     inertia = rho_I / rho_A  # of the section; stiffness is set below
-    section = fm.GeneralSection(A=1.0, Iy=inertia, Iz=inertia, J=2 * inertia, A_sy=1.0, A_sz=1.0)
+    section = fm.beams.GeneralSection(A=1.0, Iy=inertia, Iz=inertia, J=2 * inertia, A_sy=1.0, A_sz=1.0)
     stiff = fm.Material("beam", E=EA, nu=0.0, rho=rho_A)
     errors = []
     for n in (12, 24):
@@ -173,10 +165,10 @@ def local(EA, GJ, EIy, EIz, GAy, GAz, L):
 
 def test_mass_and_inertia_are_those_of_the_body():
     """Offsets, a point mass with its arm, crooked lines: mass, first moment and inertia about the mesh origin."""
-    mesh = fm.LineMesh(np.array([[0, 0, 0], [0.4, 0.1, 0], [0.5, 0.1, 0.3]], float), np.array([[0, 1], [1, 2]]))
+    mesh = fm.beams.LineMesh(np.array([[0, 0, 0], [0.4, 0.1, 0], [0.5, 0.1, 0.3]], float), np.array([[0, 1], [1, 2]]))
     steel = fm.Material("steel", E=2.1e11, nu=0.3, rho=7850.0)
-    item = fm.BeamProperty(fm.Rectangle(0.02, 0.03), steel, offset=(0.01, -0.02))
-    mass = fm.PointMass(2, mass=0.7, inertia=(1e-3, 2e-3, 2.5e-3), offset=(0.01, 0.02, -0.03))
+    item = fm.beams.BeamProperty(fm.beams.Rectangle(0.02, 0.03), steel, offset=(0.01, -0.02))
+    mass = fm.beams.PointMass(2, mass=0.7, inertia=(1e-3, 2e-3, 2.5e-3), offset=(0.01, 0.02, -0.03))
     body = fm.beam_body(mesh, item, name="frame", units=SI, point_masses=[mass])
     part = exact_beams("frame", body, pieces=3, position=(1.0, 0, 0))
     Psi_R = rigid_motion_of_dofs(body.nodes, body.dofs)
@@ -195,12 +187,12 @@ def test_mass_and_inertia_are_those_of_the_body():
 def test_springs_between_nodes_come_along():
     """Two stubs joined by a spring of six stiffnesses: the tip under a force goes as the linear model does."""
     nodes = np.array([[0, 0, 0], [0.3, 0, 0], [0.3, 0, 0.01], [0.6, 0, 0.01]])
-    mesh = fm.LineMesh(nodes, np.array([[0, 1], [2, 3]]))
+    mesh = fm.beams.LineMesh(nodes, np.array([[0, 1], [2, 3]]))
     steel = fm.Material("steel", E=2.1e11, nu=0.3, rho=7850.0)
-    spring = fm.Spring((1, 2), (2e5, 3e5, 4e5, 50.0, 60.0, 70.0))
-    ends = [fm.line_interface(mesh, name, fm.NodeIndices((k,))) for name, k in (("root", 0), ("tip", 3))]
+    spring = fm.beams.Spring((1, 2), (2e5, 3e5, 4e5, 50.0, 60.0, 70.0))
+    ends = [fm.beams.line_interface(mesh, name, fm.beams.NodeIndices((k,))) for name, k in (("root", 0), ("tip", 3))]
     body = fm.beam_body(
-        mesh, fm.BeamProperty(fm.Circle(0.01), steel), name="b", units=SI, springs=[spring], interfaces=ends
+        mesh, fm.beams.BeamProperty(fm.beams.Circle(0.01), steel), name="b", units=SI, springs=[spring], interfaces=ends
     )
     tip, _ = bent(exact_beams("b", body), steps=1, force=(0.001, 0.002, 0.003))
     K = body.K.toarray()
@@ -215,12 +207,12 @@ def test_what_is_refused():
         exact_beams("bar", bar(nx=2))
     steel = fm.Material("steel", E=2.1e11, nu=0.3, rho=7850.0)
     with pytest.raises(ModelError, match="pieces from 1"):
-        exact_beams("b", straight(2, 1.0, fm.Circle(0.01), steel), pieces=0)
-    mesh = fm.straight_line((0, 0, 0), (1, 0, 0), 3)
-    item = fm.BeamProperty(fm.Circle(0.01), steel)
-    both = fm.line_interface(mesh, "both", fm.NodeIndices((0, 1)))
+        exact_beams("b", straight(2, 1.0, fm.beams.Circle(0.01), steel), pieces=0)
+    mesh = fm.beams.straight_line((0, 0, 0), (1, 0, 0), 3)
+    item = fm.beams.BeamProperty(fm.beams.Circle(0.01), steel)
+    both = fm.beams.line_interface(mesh, "both", fm.beams.NodeIndices((0, 1)))
     with pytest.raises(ModelError, match="interface 'both' has 2 nodes"):
         exact_beams("b", fm.beam_body(mesh, item, name="b", units=SI, interfaces=[both]))
-    linked = fm.beam_body(mesh, item, name="b", units=SI, links=[fm.RigidLink(0, (1,))])
+    linked = fm.beam_body(mesh, item, name="b", units=SI, links=[fm.beams.RigidLink(0, (1,))])
     with pytest.raises(ModelError, match="has rigid links"):
         exact_beams("b", linked)

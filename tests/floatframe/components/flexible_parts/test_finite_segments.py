@@ -7,32 +7,24 @@ from numpy.testing import assert_allclose
 
 import cms
 import fe_models as fm
-from floatframe import (
-    GROUND,
-    FixedJoint,
-    ModelError,
-    PointForce,
-    System,
-    finite_segments,
-    linearize,
-    static_equilibrium,
-    system_modes,
-)
+from floatframe import GROUND, FixedJoint, PointForce, System, linearize, static_equilibrium, system_modes
+from floatframe.components import finite_segments
 from floatframe.components.flexible_parts.finite_segments import element_stiffness
+from floatframe.errors import ModelError
 
 STEEL = fm.Material("steel", E=2.0e11, nu=0.3, rho=7870.0)
 LENGTH = 0.6
 
 
 def line(shear=True):
-    return fm.beam_line(LENGTH, fm.BeamProperty(fm.Rectangle(0.02, 0.03), STEEL, shear=shear))
+    return fm.beams.beam_line(LENGTH, fm.beams.BeamProperty(fm.beams.Rectangle(0.02, 0.03), STEEL, shear=shear))
 
 
 def cone(thick=0.04, thin=0.02):
     d = Polynomial([thick, (thin - thick) / LENGTH])
     A, inertia = np.pi / 4 * d**2, np.pi / 64 * d**4
     E, G, mass = STEEL.E, STEEL.E / (2 * (1 + STEEL.nu)), STEEL.rho * inertia
-    return cms.BeamLine(
+    return fm.beams.BeamLine(
         LENGTH, STEEL.rho * A, E * A, E * inertia, E * inertia, 2 * G * inertia, rho_Iy=mass, rho_Iz=mass
     )
 
@@ -50,7 +42,7 @@ def tip(law, n, force, torque=(0, 0, 0)):
 
 @pytest.mark.parametrize("n", [2, 5])
 def test_deflection_under_an_end_load_is_that_of_timoshenkos_beam(n):
-    section = fm.Rectangle(0.02, 0.03).properties(STEEL.nu)
+    section = fm.beams.Rectangle(0.02, 0.03).properties(STEEL.nu)
     G = STEEL.E / (2 * (1 + STEEL.nu))
     exact = [
         -1e-2 * (LENGTH**3 / (3 * STEEL.E * section.Iz) + LENGTH / (G * section.A_sy)),
@@ -85,7 +77,7 @@ def test_mass_centre_and_inertia_of_the_whole_are_those_of_the_beam():
 
 def test_bending_frequencies_converge_with_the_square_of_the_length():
     """To those of the same beam in polynomials of high degree."""
-    body = cms.beam_from_assumed_modes(
+    body = cms.reduction.beam_from_assumed_modes(
         line(), name="beam", units=cms.unit_system("m-kg-s"), n_bending=10, frame=cms.NodalFrame("start")
     )
     found = np.array([system_modes(linearize(clamped(line(), n))).frequencies[:4] for n in (6, 11, 21)])
@@ -96,7 +88,7 @@ def test_bending_frequencies_converge_with_the_square_of_the_length():
 
 def test_an_end_moment_bends_it_to_a_quarter_of_a_circle():
     """M = pi EI / (2 L): the end at (2 L / pi, 2 L / pi), in the limit of many segments."""
-    law = fm.beam_line(LENGTH, fm.BeamProperty(fm.Circle(0.001), STEEL, shear=False))
+    law = fm.beams.beam_line(LENGTH, fm.beams.BeamProperty(fm.beams.Circle(0.001), STEEL, shear=False))
     moment = np.pi * law.EIz / (2 * LENGTH)
     exact = np.array([2 * LENGTH / np.pi - LENGTH, 2 * LENGTH / np.pi, 0])
     errors = [np.linalg.norm(tip(law, n, (0, 0, 0), (0, 0, moment)) - exact) / LENGTH for n in (9, 17)]
@@ -143,7 +135,7 @@ def test_impossible_segments_are_refused(options, text):
 
 
 def test_a_beam_without_rotary_inertia_is_refused():
-    law = cms.BeamLine(1.0, 1.0, 1e6, 10.0, 10.0, 10.0)
+    law = fm.beams.BeamLine(1.0, 1.0, 1e6, 10.0, 10.0, 10.0)
     with pytest.raises(ModelError, match="no rotary inertia about x"):
         finite_segments("beam", law, 4)
 

@@ -15,18 +15,18 @@ from floatframe import (
     GeneralizedAlpha,
     Gravity,
     Marker,
-    ModelError,
     PointForce,
     RevoluteJoint,
     System,
-    corotational,
     integrate,
     linearize,
     static_equilibrium,
     system_modes,
 )
+from floatframe.components import corotational
 from floatframe.components.flexible_parts.finite_segments import element_stiffness
 from floatframe.components.flexible_parts.superelement import node_inertias, relative_stiffness
+from floatframe.errors import ModelError
 from floatframe.model.bodies.mode_choice import frozen_to_rigid
 from floatframe.results.place_motion import interface_motion, point_motion
 from tests.bodies import bar
@@ -34,22 +34,22 @@ from tests.bodies import bar
 STEEL = fm.Material("steel", E=2.0e11, nu=0.3, rho=7870.0)
 UNITS = cms.unit_system("m-kg-s")
 LENGTH = 0.4
-ITEM = fm.BeamProperty(fm.Rectangle(0.01, 0.02), STEEL, orientation=(0, 1, 0))
+ITEM = fm.beams.BeamProperty(fm.beams.Rectangle(0.01, 0.02), STEEL, orientation=(0, 1, 0))
 CHORD = cms.NodalFrame(dofs=((0, 0), (0, 1), (0, 2), (0, 3), (6, 1), (6, 2)))
 
 
-THIN = replace(ITEM, section=fm.Circle(0.001))
+THIN = replace(ITEM, section=fm.beams.Circle(0.001))
 
 
 def beam(length=LENGTH, *, n_modes=0, frame=None, item=ITEM):
-    mesh = fm.straight_line((0, 0, 0), (length, 0, 0), 6)
-    ends = [fm.line_interface(mesh, end, fm.NodeIndices((k,))) for end, k in (("start", 0), ("end", 6))]
+    mesh = fm.beams.straight_line((0, 0, 0), (length, 0, 0), 6)
+    ends = [fm.beams.line_interface(mesh, end, fm.beams.NodeIndices((k,))) for end, k in (("start", 0), ("end", 6))]
     body = cms.couple(fm.beam_body(mesh, item, name="beam", units=UNITS, interfaces=ends))
     return cms.reduce(body, cms.craig_bampton(body, n_modes=n_modes), frame=frame)
 
 
 def law(length=LENGTH):
-    return fm.beam_line(length, replace(ITEM, orientation=None))
+    return fm.beams.beam_line(length, replace(ITEM, orientation=None))
 
 
 @pytest.mark.parametrize("frame", [cms.TisserandFrame(), cms.NodalFrame("start"), CHORD])
@@ -76,7 +76,7 @@ def test_shares_of_the_nodes_are_those_of_the_consistent_mass(frame):
 
 def bodies():
     solid = cms.couple(bar(nx=6, length=0.4, width=0.05, height=0.04))
-    return {"beam": beam(), "solid": cms.reduce(solid, cms.guyan(solid))}
+    return {"beam": beam(), "solid": cms.reduce(solid, cms.modes.guyan(solid))}
 
 
 @pytest.mark.parametrize("name", ["beam", "solid"])

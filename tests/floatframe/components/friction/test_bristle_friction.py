@@ -9,17 +9,17 @@ from floatframe import (
     GROUND,
     GeneralizedAlpha,
     Marker,
-    ModelError,
     PointForce,
     PrismaticJoint,
     RevoluteJoint,
     RigidBody,
     System,
-    element_motion,
     integrate,
 )
 from floatframe.components.friction import BristleFriction
+from floatframe.errors import ModelError
 from floatframe.model.functions.time_functions import harmonic
+from floatframe.results import element_motion
 from floatframe.results.energy_balance import balance_defect
 from tests.floatframe.components.friction.examples import NUMBERS, pulled
 from tests.floatframe.finite_differences import assert_tangent_is_exact

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import RigidBody, System, check_element
+from floatframe import RigidBody, System
+from floatframe.analyses import check_element
 from floatframe.components.hydraulics import (
     Accumulator,
     CheckValve,

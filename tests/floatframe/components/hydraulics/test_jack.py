@@ -4,11 +4,8 @@ import numpy as np
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
-from floatframe import (
-    GeneralizedAlpha,
-    element_motion,
-    integrate,
-)
+from floatframe import GeneralizedAlpha, integrate
+from floatframe.results import element_motion
 from floatframe.results.energy_balance import balance_defect, energy_scale
 from tests.floatframe.components.hydraulics.jack_examples import (
     AMBIENT,

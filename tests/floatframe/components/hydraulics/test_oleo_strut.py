@@ -5,14 +5,10 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
-from floatframe import (
-    GeneralizedAlpha,
-    Marker,
-    element_motion,
-    integrate,
-)
+from floatframe import GeneralizedAlpha, Marker, integrate
 from floatframe.errors import ModelError
 from floatframe.model.functions.tables import monotone_table
+from floatframe.results import element_motion
 from tests.floatframe.components.hydraulics.oleo_strut_examples import (
     A_GAS,
     A_OIL,

@@ -30,14 +30,14 @@ from tests.references.planar_dynamics import integrate as integrate_exact
 
 LENGTH, SIDE, N = 5.0, 0.03, 16
 ALLOY = fm.Material("alloy", E=7e10, nu=0.3, rho=2700.0)
-SQUARE = fm.Rectangle(SIDE, SIDE)
+SQUARE = fm.beams.Rectangle(SIDE, SIDE)
 INERTIA = 20.0  #: of the hub about z [kg m²]
 H = 4e-3
 FRAMES = {
     "mean": cms.TisserandFrame(),
     "root": cms.NodalFrame("root"),
     "both ends": cms.NodalFrame(dofs=((0, 0), (0, 1), (0, 2), (0, 3), (N, 1), (N, 2))),
-    "Buckens": cms.BuckensFrame(),
+    "Buckens": cms.reduction.BuckensFrame(),
 }
 SAME = 1e-6  #: of the deflection: what Newton's tolerance of 1e-9 leaves between frames over hundreds of steps
 
@@ -45,9 +45,9 @@ SAME = 1e-6  #: of the deflection: what Newton's tolerance of 1e-9 leaves betwee
 @cache
 def boom(frame):
     """Return an aluminium boom of 5 m, elastic in its plane, in a frame."""
-    mesh = fm.straight_line((0, 0, 0), (LENGTH, 0, 0), N)
-    ends = [fm.line_interface(mesh, name, fm.NodeIndices((k,))) for name, k in (("root", 0), ("tip", N))]
-    section = fm.BeamProperty(SQUARE, ALLOY, orientation=(0, 1, 0))
+    mesh = fm.beams.straight_line((0, 0, 0), (LENGTH, 0, 0), N)
+    ends = [fm.beams.line_interface(mesh, name, fm.beams.NodeIndices((k,))) for name, k in (("root", 0), ("tip", N))]
+    section = fm.beams.BeamProperty(SQUARE, ALLOY, orientation=(0, 1, 0))
     body = fm.beam_body(mesh, section, name="boom", units=cms.unit_system("m-kg-s"), interfaces=ends)
     body = fm.planar(cms.couple(body))
     return cms.reduce(body, cms.craig_bampton(body, n_modes=4), frame=FRAMES[frame], geometric=True)

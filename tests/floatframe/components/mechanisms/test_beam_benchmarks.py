@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 
 import cms
 from benchmarks.field_beams import UNITS, exact, marker_of, parts, path, segments, superelements
-from floatframe import GeneralizedAlpha, integrate, snapshot, static_equilibrium
-from floatframe.analyses import equilibrium
+from floatframe import GeneralizedAlpha, integrate, static_equilibrium
+from floatframe.analyses import equilibrium, snapshot
 from floatframe.components.flexible_parts import floating_parts
 from floatframe.components.mechanisms import buckling_beam, loaded_cantilever, misaligned_four_bar, unbalanced_shaft
 from floatframe.components.mechanisms.beam_benchmarks import (
@@ -151,6 +151,6 @@ def test_turns_are_those_of_the_problems():
 def test_parts_without_bodies_or_geometric_stiffness_are_refused():
     with pytest.raises(ModelError, match="floating_parts 'beam': expected a reduced body or several, got none"):
         floating_parts("beam", [])
-    plain = cms.beam_from_assumed_modes(SHAFT_LINE, name="plain", units=UNITS, geometric=False)
+    plain = cms.reduction.beam_from_assumed_modes(SHAFT_LINE, name="plain", units=UNITS, geometric=False)
     with pytest.raises(ModelError, match="body 'plain' has no geometric stiffness; reduce it with geometric=True"):
         floating_parts("beam", [plain])

@@ -27,14 +27,17 @@ FRAMES = {
     "held at both ends": cms.NodalFrame(dofs=((0, 0), (0, 1), (0, 2), (0, 3), (16, 1), (16, 2))),
     "mean axis": cms.TisserandFrame(),
     "clamped at the pin": cms.NodalFrame("start"),
-    "Buckens": cms.BuckensFrame(),
+    "Buckens": cms.reduction.BuckensFrame(),
 }
 
 
 def reduced_rod(frame):
-    mesh = fm.straight_line((0, 0, 0), (ROD, 0, 0), 16)
-    kept = [fm.line_interface(mesh, p, fm.NodeIndices((k,))) for p, k in (("start", 0), ("middle", 8), ("end", 16))]
-    of_line = fm.BeamProperty(fm.Circle(DIAMETER / 2), STEEL, orientation=(0, 1, 0))
+    mesh = fm.beams.straight_line((0, 0, 0), (ROD, 0, 0), 16)
+    kept = [
+        fm.beams.line_interface(mesh, p, fm.beams.NodeIndices((k,)))
+        for p, k in (("start", 0), ("middle", 8), ("end", 16))
+    ]
+    of_line = fm.beams.BeamProperty(fm.beams.Circle(DIAMETER / 2), STEEL, orientation=(0, 1, 0))
     body = fm.beam_body(mesh, of_line, name="rod", units=cms.unit_system("m-kg-s"), interfaces=kept)
     body = fm.planar(cms.couple(body))
     return cms.reduce(body, cms.craig_bampton(body, n_modes=4), frame=FRAMES[frame], geometric=True)
@@ -55,7 +58,7 @@ def flexible(rod, drive, t_end, h, speed):
 def exact(drive, t_end, h, n, speed):
     """Return the deflection of the exact beam; it begins with the velocities of the rigid mechanism."""
     A, inertia = np.pi * DIAMETER**2 / 4, np.pi * DIAMETER**4 / 64
-    shear = STEEL.E / (2 * (1 + STEEL.nu)) * fm.Circle(DIAMETER / 2).properties(STEEL.nu).A_sy
+    shear = STEEL.E / (2 * (1 + STEEL.nu)) * fm.beams.Circle(DIAMETER / 2).properties(STEEL.nu).A_sy
     beam = ExactBeam(
         (CRANK, 0), (CRANK + ROD, 0), n, STEEL.E * A, shear, STEEL.E * inertia, STEEL.rho * A, STEEL.rho * inertia
     )

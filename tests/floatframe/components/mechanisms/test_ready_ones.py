@@ -6,17 +6,8 @@ from numpy.testing import assert_allclose
 
 import cms
 import fe_models as fm
-from floatframe import (
-    FlexibleBody,
-    GeneralizedAlpha,
-    ModelError,
-    consistent_state,
-    integrate,
-    linearize,
-    mobility,
-    static_equilibrium,
-    system_modes,
-)
+from floatframe import FlexibleBody, GeneralizedAlpha, integrate, linearize, static_equilibrium, system_modes
+from floatframe.analyses import consistent_state, mobility
 from floatframe.components.mechanisms import (
     chain,
     double_pendulum,
@@ -26,6 +17,7 @@ from floatframe.components.mechanisms import (
     slider_crank,
     spinning_top,
 )
+from floatframe.errors import ModelError
 from floatframe.model.functions.time_functions import cycloidal_spin_up, polynomial_of_time
 from floatframe.model.rotations import rotation_exp, rotation_matrix
 from floatframe.results.joint_coordinates import joint_coordinate
@@ -155,14 +147,18 @@ def stiff_rod(length=1.0, mass=1.0):
     """A reduced rod as slender as the rigid ones and nearly as stiff, its interfaces with axes of their own."""
     radius = 0.01 * length
     light = fm.Material("light", E=1e13, nu=0.3, rho=mass / (np.pi * radius**2 * length))
-    mesh = fm.straight_line((0.1, 0.2, 0.0), (0.1, 0.2, length), 6)  # along z, away from the origin of the mesh
+    mesh = fm.beams.straight_line((0.1, 0.2, 0.0), (0.1, 0.2, length), 6)  # along z, away from the origin of the mesh
     triads = [rotation_exp(np.array(v)) for v in ((0.3, -0.5, 0.8), (-1.0, 0.2, 0.4))]
     ends = [
-        fm.line_interface(mesh, name, fm.NodeIndices((k,)), triad=triad)
+        fm.beams.line_interface(mesh, name, fm.beams.NodeIndices((k,)), triad=triad)
         for name, k, triad in zip(("start", "end"), (0, 6), triads, strict=True)
     ]
     body = fm.beam_body(
-        mesh, fm.BeamProperty(fm.Circle(radius), light), name="rod", units=cms.unit_system("m-kg-s"), interfaces=ends
+        mesh,
+        fm.beams.BeamProperty(fm.beams.Circle(radius), light),
+        name="rod",
+        units=cms.unit_system("m-kg-s"),
+        interfaces=ends,
     )
     coupled = cms.couple(body)
     return cms.reduce(coupled, cms.craig_bampton(coupled, n_modes=2))

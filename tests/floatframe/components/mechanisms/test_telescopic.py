@@ -5,8 +5,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 import cms
-from floatframe import GeneralizedAlpha, ModelError, integrate, mobility
+import fe_models
+from floatframe import GeneralizedAlpha, integrate
+from floatframe.analyses import mobility
 from floatframe.components.mechanisms import telescopic_slider_crank
+from floatframe.errors import ModelError
 from floatframe.model.functions.time_functions import cycloidal_spin_up
 from floatframe.results.joint_coordinates import joint_coordinate
 from floatframe.results.place_motion import interface_motion
@@ -16,9 +19,9 @@ STATIONS = {f"s{k}": k * LENGTH / 8 for k in range(9)}
 
 
 def rod(EI, geometric=True):
-    line = cms.BeamLine(LENGTH, 0.2, 1e5 * EI, EI, EI, 0.8 * EI, rho_Iy=1e-6, rho_Iz=1e-6)
+    line = fe_models.beams.BeamLine(LENGTH, 0.2, 1e5 * EI, EI, EI, 0.8 * EI, rho_Iy=1e-6, rho_Iz=1e-6)
     units = cms.unit_system("m-kg-s")
-    return cms.beam_from_assumed_modes(
+    return cms.reduction.beam_from_assumed_modes(
         line, name="rod", units=units, n_axial=1, n_bending=6, n_torsion=1, stations=STATIONS, geometric=geometric
     )
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import ModelError
 from floatframe.components.rails.conicity import (
     equivalent_conicity,
     harmonic_conicity,
@@ -18,6 +17,7 @@ from floatframe.components.rails.contact_search import Pair, quasi_elastic, rigi
 from floatframe.components.rails.contact_table import TableGrid, contact_table, numbers_of_table
 from floatframe.components.rails.law import contact_fields
 from floatframe.components.rails.standard_profiles import cone, head_of_circles, rail_60e1, wheel_s1002
+from floatframe.errors import ModelError
 
 NEW = Pair()
 CONE = Pair(wheel=cone(1 / 20))

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import ModelError
 from floatframe.components.rails.kalker import asymptotes, kalker_coefficients
 from floatframe.components.rails.law import (
     creep_force,
@@ -14,6 +13,7 @@ from floatframe.components.rails.law import (
     polach,
     saturated_creep,
 )
+from floatframe.errors import ModelError
 
 A, B, N, G, MU = 8e-3, 4e-3, 8.2e4, 8.2e10, 0.3  #: the example of FASTSIM that comes with CONTACT
 STEEL = kalker_coefficients(np.array(A / B), 0.28)

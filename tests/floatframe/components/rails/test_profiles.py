@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import ModelError
 from floatframe.components.rails.profile import Profile, profile_of_points
 from floatframe.components.rails.standard_profiles import (
     S1002_BOUNDS,
@@ -15,6 +14,7 @@ from floatframe.components.rails.standard_profiles import (
     s1002,
     wheel_s1002,
 )
+from floatframe.errors import ModelError
 
 
 def test_the_eight_sections_of_s1002_meet_with_equal_slopes():

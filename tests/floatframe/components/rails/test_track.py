@@ -7,11 +7,11 @@ from scipy.integrate import quad
 from scipy.signal import welch
 from scipy.special import fresnel
 
-from floatframe import ModelError
 from floatframe.components.rails.irregularities import SPECTRA, Irregularities, random_irregularities, wheel_envelope
 from floatframe.components.rails.law import deviation, place_on_track
 from floatframe.components.rails.splines import coefficients
 from floatframe.components.rails.track import Segment, Track, curve
+from floatframe.errors import ModelError
 
 
 def test_a_transition_is_a_clothoid_and_a_circle_closes():

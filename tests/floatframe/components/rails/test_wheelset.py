@@ -8,27 +8,26 @@ from numpy.testing import assert_allclose
 
 from floatframe import (
     GROUND,
-    Bushing,
-    ConvergenceError,
-    ElementSensor,
-    Event,
     GeneralizedAlpha,
     Marker,
-    ModelError,
     PointForce,
     PrismaticJoint,
     RevoluteJoint,
     RigidBody,
     System,
-    check_element,
-    element_motion,
     integrate,
 )
+from floatframe.analyses import check_element
 from floatframe.components import rails
 from floatframe.components.rails.conicity import wheelset_at
 from floatframe.components.rails.contact_search import rigid_contacts
+from floatframe.errors import ConvergenceError, ModelError
 from floatframe.files.system_file.read_system import read_system
+from floatframe.forces import Bushing
 from floatframe.model.rotations import euler_parameters
+from floatframe.results import element_motion
+from floatframe.sensors import ElementSensor
+from floatframe.simulation import Event
 from tests.floatframe.components.rails.examples import CONE, DOWN, I_X, I_Y, LOAD, MASS, NEW, axle
 from tests.floatframe.components.rails.linear_wheelset import Suspended, eigenvalues
 

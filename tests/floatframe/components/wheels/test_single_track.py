@@ -19,7 +19,8 @@ def lateral_states(car, V, duration, *, v=0.01, r=0.01):
     yaw = 2 * np.arctan2(chassis.p[:, 3], chassis.p[:, 0])
     side = np.cos(yaw) * chassis.v[:, 1] - np.sin(yaw) * chassis.v[:, 0]
     forces = [
-        sum(ff.element_motion(system, motion, f"tyre_{axle}{end}").outputs["Fy"] for end in "lr") for axle in "fr"
+        sum(ff.results.element_motion(system, motion, f"tyre_{axle}{end}").outputs["Fy"] for end in "lr")
+        for axle in "fr"
     ]
     return motion.t, np.stack([side, chassis.omega_B[:, 2], *forces])
 

@@ -20,7 +20,7 @@ def test_a_wheel_falls_and_rests_on_m_g_over_k():
     flight = motion.t < 0.13
     assert_allclose(motion.body("wheel").r[flight, 2], 0.4 - G * motion.t[flight] ** 2 / 2, atol=1e-6)
     assert_allclose(motion.body("wheel").r[-1], [0, 0, R0 - M * G / K], atol=1e-8)
-    assert_allclose(ff.element_motion(system, motion, "tyre").outputs["Fz"][-1], M * G, rtol=1e-6)
+    assert_allclose(ff.results.element_motion(system, motion, "tyre").outputs["Fz"][-1], M * G, rtol=1e-6)
 
 
 def test_a_wheel_that_slips_comes_to_roll_and_the_energy_is_accounted_for():
@@ -33,7 +33,7 @@ def test_a_wheel_that_slips_comes_to_roll_and_the_energy_is_accounted_for():
     V, Omega = motion.body("wheel").v[:, 0], motion.body("wheel").omega_B[:, 1]
     assert_allclose(M * V + 1.0 * Omega / R0, M * 5.0, rtol=1e-8)
     assert_allclose(V[-1], R0 * Omega[-1], rtol=5e-3)
-    seen = ff.element_motion(system, motion, "tyre").outputs
+    seen = ff.results.element_motion(system, motion, "tyre").outputs
     left = 0.5 * M * V[-1] ** 2 + 0.5 * Omega[-1] ** 2 + seen["energy"][-1] - seen["energy"][0]
     assert_allclose(np.trapezoid(seen["power_lost"], motion.t), 0.5 * M * 25 - left, rtol=2e-3)
     assert np.abs(balance_defect(motion)).max() < 2e-4 * energy_scale(motion)
@@ -43,7 +43,7 @@ def test_a_wheel_that_leaves_its_road_stops_the_run_and_what_it_did_is_kept():
     road = wheels.profile_road([-1.0, 1.0], [0.0, 0.0])
     start = wheel(R0 - M * G / K, velocity=(10.0, 0, 0), omega_B=(0, 10 / 0.2997, 0))
     system = ff.System([start], [], [DOWN], elements=[linear(road=road)])
-    with pytest.raises(ff.FloatframeError, match="end of its road") as raised:
+    with pytest.raises(ff.errors.FloatframeError, match="end of its road") as raised:
         ff.integrate(system, METHOD, 1.0, 1e-3)
     assert_allclose(raised.value.trajectory.body("wheel").r[-1, 0], 1.0, atol=0.02)
 
@@ -67,7 +67,7 @@ def test_parked_on_a_slope_it_stays_where_it_is():
     half = len(motion.t) // 2
     assert np.abs(r[-1] - r[half]).max() < 1e-9
     assert np.abs(r[-1, :2]).max() < 0.01
-    along = sum(ff.element_motion(system, motion, name).outputs["Fx"][-1] for name in ("fl", "fr", "rl", "rr"))
+    along = sum(ff.results.element_motion(system, motion, name).outputs["Fx"][-1] for name in ("fl", "fr", "rl", "rr"))
     assert_allclose(along, 1000 * G * 0.8 * np.sin(0.3), rtol=1e-6)
 
 
@@ -103,7 +103,7 @@ def test_a_quarter_car_has_the_modes_of_its_two_masses():
     )
     tyre = linear(damping=c_t, relaxation_x=0.0, relaxation_y=0.0)
     system = ff.System(bodies, joints, [DOWN, spring], elements=[tyre])
-    found = np.linalg.eigvals(ff.named_state_space(ff.linearize(system)).A)
+    found = np.linalg.eigvals(ff.analyses.named_state_space(ff.linearize(system)).A)
     mass, zero = np.diag([m_s, M]), np.zeros((2, 2))
     stiffness = np.array([[k_s, -k_s], [-k_s, k_s + K]])
     damping = np.array([[c_s, -c_s], [-c_s, c_s + c_t]])
@@ -158,7 +158,7 @@ def read(tmp_path, road):
     ],
 )
 def test_a_road_that_is_none_is_refused_by_its_key(tmp_path, road, message):
-    with pytest.raises(ff.FloatframeError, match=message):
+    with pytest.raises(ff.errors.FloatframeError, match=message):
         read(tmp_path, road)
 
 
@@ -196,7 +196,7 @@ def test_a_rolling_wheel_of_a_tyre_file_settles_at_the_slips_and_forces_of_the_f
     element = wheels.MagicFormulaTyre("tyre", ff.Marker(ff.GROUND), ff.Marker("wheel"), tyre, axis=along)
     system = ff.System([sled, body], [rail, hub], elements=[element])
     motion = ff.integrate(system, METHOD, 0.6, 1e-3)
-    seen = {name: values[-1] for name, values in ff.element_motion(system, motion, "tyre").outputs.items()}
+    seen = {name: values[-1] for name, values in ff.results.element_motion(system, motion, "tyre").outputs.items()}
     assert_allclose(abs(seen["alpha"]), yaw, rtol=1e-3)
     common = (seen["Fz"], seen["kappa"], seen["alpha"], seen["gamma"], speed * np.cos(yaw), tyre.speed)
     write = version_52 if version == 52 else version_61

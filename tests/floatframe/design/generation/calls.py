@@ -83,7 +83,7 @@ class Case:
     """A system, its model and random motions: z, z_dot, z_ddot, force."""
 
     def __init__(self, system, n=N_STATES):
-        self.system, self.model = system, ff.relative_model(system)
+        self.system, self.model = system, ff.analyses.relative_model(system)
         self.motions = []
         start, n_rates = self.model.positions()[0], self.model.n_rates
         for seed in range(n):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 import cms
+import fe_models
 import floatframe as ff
 from cms.reduction.basis.frames import NodalFrame
 from floatframe.components.mechanisms import chain
@@ -12,7 +13,7 @@ from floatframe.engine.tree.recursion.expansion import marker_shape
 from tests.floatframe.engine.tree.plain_kinematics import flexible_tree
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 
-SLENDER = cms.BeamLine(1.0, 4.7, 1.26e8, 4.2e3, 9.5e3, 3.8e3, rho_Iy=1.6e-4, rho_Iz=3.5e-4)
+SLENDER = fe_models.beams.BeamLine(1.0, 4.7, 1.26e8, 4.2e3, 9.5e3, 3.8e3, rho_Iy=1.6e-4, rho_Iz=3.5e-4)
 METRES = cms.unit_system("m-kg-s")
 
 
@@ -22,10 +23,10 @@ def beam(*, is_clamped, n_axial=0, n_bending=2, n_torsion=0, is_nodal=False):
     is_nodal: with geometric stiffness too the file has a frame that goes with the start, which the engine changes.
     """
     frame = NodalFrame("start", origin=(0.2, 0.1, 0.0)) if is_nodal else NodalFrame("start") if is_clamped else None
-    return cms.beam_from_assumed_modes(
+    return cms.reduction.beam_from_assumed_modes(
         SLENDER, name="beam", units=METRES, n_axial=n_axial, n_bending=n_bending, n_torsion=n_torsion, n_shear=0,
         stations={"start": 0.0, "end": 1.0}, frame=frame,
-        geometric=not is_clamped, damping=cms.ModalDamping(0.02),
+        geometric=not is_clamped, damping=cms.reduction.ModalDamping(0.02),
     )  # fmt: skip
 
 
@@ -48,7 +49,9 @@ def flexible_in_the_middle():
     joints = [
         ff.RevoluteJoint("waist", ff.GROUND, ff.Marker("base link"), axis=(0, 0, 1)),
         ff.RevoluteJoint("elbow", at, ff.Marker("middle", "start"), axis=(0, 1, 0)),
-        ff.UniversalJoint("wrist", ff.Marker("middle", "end"), ff.Marker("tool"), axis=(0, 1, 0), axis_b=(0, 0, 1)),
+        ff.joints.UniversalJoint(
+            "wrist", ff.Marker("middle", "end"), ff.Marker("tool"), axis=(0, 1, 0), axis_b=(0, 0, 1)
+        ),
     ]
     return ff.System([rigid, middle, tool], joints, [ff.Gravity((0.3, -0.2, -9.81))], name="middle")
 
@@ -67,7 +70,7 @@ def held_at_the_free_end():
 def spun_about_its_length():
     """Return a beam clamped to a hinge along it: undeformed it is the same all around that."""
     line = replace(SLENDER, rho_Iz=SLENDER.rho_Iy)
-    shaft = cms.beam_from_assumed_modes(
+    shaft = cms.reduction.beam_from_assumed_modes(
         line, name="shaft", units=METRES, n_axial=0, n_bending=1, n_torsion=0, n_shear=0,
         stations={"start": 0.0, "end": 1.0}, frame=NodalFrame("start"), geometric=False,
     )  # fmt: skip

@@ -8,10 +8,10 @@ import floatframe as ff
 def sympy_operations(system):
     """Return additions and multiplications of the generated Python text after `sympy.cse`, which takes it apart."""
     sympy = pytest.importorskip("sympy")
-    lines = ff.generate(system, language="python", name="f").files["f.py"].splitlines()
+    lines = ff.design.generate(system, language="python", name="f").files["f.py"].splitlines()
     start = next(k for k, line in enumerate(lines) if line.startswith("    t0 = "))
     end = next(k for k, line in enumerate(lines) if line.startswith("    return stacked(force"))
-    n = ff.relative_model(system).n_z
+    n = ff.analyses.relative_model(system).n_z
     space = {name: sympy.symbols(f"{name}:{n}") for name in ("z", "z_dot", "z_ddot")}
     space |= {"sin": sympy.sin, "cos": sympy.cos}
     exec("\n".join(line[4:] for line in lines[start:end]), space)

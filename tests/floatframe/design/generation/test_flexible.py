@@ -30,7 +30,7 @@ class Case:
 
     def __init__(self, name):
         self.name, self.system = name, SYSTEMS[name]()
-        self.model = ff.relative_model(self.system)
+        self.model = ff.analyses.relative_model(self.system)
         self.motions = [bent_motion(self.model, seed) for seed in STATES]
 
 
@@ -163,7 +163,7 @@ def test_sensitivities_to_a_rigid_link_below_a_flexible_one_are_those_of_differe
         difference = force(*motion, values + step) - force(*motion, values)
         assert_allclose(by[:, k], difference, rtol=0, atol=1e-12 * max(size, np.abs(difference).max()))
     heavier = [replace(body, mass=2.0 * body.mass) if body.name == "tool" else body for body in case.system.bodies]
-    moved = ff.relative_model(replace(case.system, bodies=heavier))
+    moved = ff.analyses.relative_model(replace(case.system, bodies=heavier))
     assert np.abs(moved.inverse_dynamics(*motion) - case.model.inverse_dynamics(*motion)).max() > 1e-6 * size
 
 
@@ -181,7 +181,7 @@ def test_numbers_of_symmetric_beams_that_are_rounding_vanish():
 def test_a_body_with_modes_turns_with_its_hinge_even_if_it_is_round():
     """Its modes bend to one side each, which weights and spin tell apart."""
     system = spun_about_its_length()
-    model = ff.relative_model(system)
+    model = ff.analyses.relative_model(system)
     z, z_dot, z_ddot = bent_motion(model, 0)
     expected, turned = (model.inverse_dynamics(each, z_dot, z_ddot) for each in (z, z + np.eye(3)[0]))
     assert np.abs(turned - expected).max() > 1
@@ -196,7 +196,7 @@ def test_rotations_in_space_are_told_to_be_good_up_to_some_angle_and_those_about
     code = generate(twisted, language="python", name="f")
     assert "up to 4 rad" not in code.files["f.py"]
     assert code.operations.functions > 4  # two hinges, and the twist at the second
-    model = ff.relative_model(twisted)
+    model = ff.analyses.relative_model(twisted)
     motion = bent_motion(model, 0)
     near(python_function(twisted, "inverse")(*motion), model.inverse_dynamics(*motion))
 

@@ -112,7 +112,7 @@ def test_sensitivities_are_what_a_change_of_all_bodies_does(system):
     for z, z_dot, z_ddot, _ in case.motions:
         by = run(z, z_dot, z_ddot, values)
         added = np.concatenate([rng.uniform(0.1, 1) * point_mass(rng.normal(size=3)) for _ in names])
-        other = ff.relative_model(system_with(case.system, values + added))
+        other = ff.analyses.relative_model(system_with(case.system, values + added))
         before, after = (model.inverse_dynamics(z, z_dot, z_ddot) for model in (case.model, other))
         near(by @ values, before)
         assert_allclose(by @ added, after - before, rtol=0, atol=1e-12 * np.abs(after).max())
@@ -123,7 +123,7 @@ def test_sensitivities_to_gravity_are_what_another_gravity_does():
     run = python_function(case.system, "sensitivity", parameters=["gravity"])
     z, z_dot, z_ddot, _ = case.motions[1]
     gravity = np.array([3.0, -2.0, 5.0])
-    other = ff.relative_model(ff.System(case.system.bodies, case.system.joints, [ff.Gravity(gravity)]))
+    other = ff.analyses.relative_model(ff.System(case.system.bodies, case.system.joints, [ff.Gravity(gravity)]))
     code = generate(case.system, what="sensitivity", parameters=["gravity"])
     assert code.parameter_names == GRAVITY
     change = other.inverse_dynamics(z, z_dot, z_ddot) - case.model.inverse_dynamics(z, z_dot, z_ddot)
@@ -157,7 +157,7 @@ def test_c_has_the_numbers_of_the_model(system, tmp_path):
 
 def test_a_wheel_does_not_turn_with_its_hub_where_that_changes_nothing():
     """The round one does not; those out of balance, oval, and with a body on them do."""
-    tree = carried_inwards(tree_terms(ff.relative_model(wheels()).expansion))
+    tree = carried_inwards(tree_terms(ff.analyses.relative_model(wheels()).expansion))
     assert [link.is_round for link in tree.links] == [False, True, False, False, False, False]
     text = generate(wheels(), name="f").files["f.c"]
     assert [f"z[{k}]" in text for k in range(6)] == [True, False, True, True, True, True]
@@ -165,7 +165,7 @@ def test_a_wheel_does_not_turn_with_its_hub_where_that_changes_nothing():
 
 def test_no_link_on_a_hinge_keeps_more_than_seven_numbers():
     """Those of a body on a hinge that can be told from a motion of its parent; the third moves with that."""
-    tree = carried_inwards(tree_terms(ff.relative_model(puma()).expansion))
+    tree = carried_inwards(tree_terms(ff.analyses.relative_model(puma()).expansion))
     kept = [[*link.s, *link.P[np.triu_indices(3)], link.mass] for link in tree.links]
     assert [sum(not value.is_constant(0.0) for value in each) for each in kept] == [7] * 6
 

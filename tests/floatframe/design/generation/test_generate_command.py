@@ -34,7 +34,7 @@ def test_the_command_writes_what_the_function_returns(pendulum, tmp_path):
     assert sorted(path.name for path in folder.iterdir()) == [
         "stick_inverse.c", "stick_inverse.h", "stick_mass.c", "stick_mass.h",
     ]  # fmt: skip
-    code = ff.generate(read_system(pendulum)[0], name="stick_inverse")
+    code = ff.design.generate(read_system(pendulum)[0], name="stick_inverse")
     assert (folder / "stick_inverse.c").read_text() == code.files["stick_inverse.c"]
     # torque = (J + m l²) z_ddot - m g l cos z: two products, a difference, a cosine; M is a number
     counted = record["functions"]["stick_inverse"]
@@ -51,7 +51,7 @@ def test_all_routines_of_all_languages_are_written(language, pendulum, tmp_path)
     record = json.loads(made.stdout)
     assert set(record["functions"]) == {f"stick_{what}" for what in ROUTINES}
     for what in ROUTINES:
-        code = ff.generate(read_system(pendulum)[0], what=what, language=language, name=f"stick_{what}")
+        code = ff.design.generate(read_system(pendulum)[0], what=what, language=language, name=f"stick_{what}")
         for name, text in code.files.items():
             assert (folder / name).read_text() == text
             assert f"{code.name}" in text

@@ -22,7 +22,7 @@ def oscillator(k=40.0, c=0.6, m=2.0):
     body = ff.RigidBody("mass", m, np.eye(3), position=(1.1, 0, 0))
     guide = ff.PrismaticJoint("guide", ff.Marker(ff.GROUND), ff.Marker("mass"), axis=(1, 0, 0))
     spring = ff.SpringDamper("spring", ff.Marker(ff.GROUND), ff.Marker("mass"), k, c, 1.0)
-    return ff.System([body], [guide], [spring], sensors=[ff.PlaceSensor("place", ff.Marker("mass"))])
+    return ff.System([body], [guide], [spring], sensors=[ff.sensors.PlaceSensor("place", ff.Marker("mass"))])
 
 
 def crank():
@@ -32,8 +32,9 @@ def crank():
     forces = [ff.Gravity((0, -9.81, 0)), ff.SpringDamper("spring", post, ff.Marker("slider"), 50.0, 3.0, 0.3)]
     slider = ff.Marker("slider")
     sensors = [
-        ff.PlaceSensor("x", slider), ff.PlaceSensor("v", slider, "velocity"),
-        ff.PlaceSensor("a", slider, "acceleration"), ff.ReactionSensor("load", "pin"), ff.EnergySensor("energy"),
+        ff.sensors.PlaceSensor("x", slider), ff.sensors.PlaceSensor("v", slider, "velocity"),
+        ff.sensors.PlaceSensor("a", slider, "acceleration"), ff.sensors.ReactionSensor("load", "pin"),
+        ff.sensors.EnergySensor("energy"),
     ]  # fmt: skip
     return replace(system, forces=forces, sensors=sensors)
 
@@ -48,7 +49,7 @@ def swinging_body(stiffened=False):
     ball = ff.SphericalJoint("ball", ff.GROUND, ff.Marker("body", "end_a"))
     end = np.array([1.0, 0.4, -0.3])
     spring = ff.SpringDamper("spring", ff.Marker(ff.GROUND, position=end), ff.Marker("body", "end_b"), 30.0, 2.0, 0.5)
-    sensors = [ff.PlaceSensor("tip", ff.Marker("body", "end_b")), ff.ModeSensor("mode", "body", 2)]
+    sensors = [ff.sensors.PlaceSensor("tip", ff.Marker("body", "end_b")), ff.sensors.ModeSensor("mode", "body", 2)]
     gravity = ff.Gravity((0.3, 0.0, -9.81))
     return ff.System(
         [ff.FlexibleBody("body", reduced)], [ball], [gravity, spring], sensors=sensors, units=reduced.units
@@ -70,7 +71,7 @@ def differences_of_runs(system, path, outputs, step, *, t_end, h, rho_inf=0.8):
 
 def last(system, motion, of):
     sensor, _, column = of.partition(" ")
-    return ff.measured(system, motion)[sensor].columns[column][-1]
+    return ff.sensors.measured(system, motion)[sensor].columns[column][-1]
 
 
 def test_an_oscillator_has_the_derivatives_of_its_closed_form():
@@ -87,7 +88,7 @@ def test_an_oscillator_has_the_derivatives_of_its_closed_form():
     paths = ["forces.spring.stiffness", "forces.spring.damping", "bodies.mass.mass", "bodies.mass.position.0"]
     errors = []
     for h in (0.035, 0.0175):
-        found = ff.sensitivities(oscillator(), ["place x"], paths, t_end=t, h=h)
+        found = ff.design.sensitivities(oscillator(), ["place x"], paths, t_end=t, h=h)
         errors.append(found.gradient[0] - exact)
     assert_allclose(errors[0] / errors[1], 4.0, rtol=0.1)
     assert_allclose(errors[1], 0, rtol=0, atol=3e-3 * np.abs(exact).max())
@@ -101,7 +102,7 @@ def test_a_pendulum_has_the_derivative_of_its_elliptic_integral():
     J = 1 / 3 + 0.01**2 / 4
     w0 = np.sqrt(9.81 * 0.5 / J)
     quarter = ellipk(0.5) / w0
-    found = ff.sensitivities(
+    found = ff.design.sensitivities(
         system, ["hinge 1.angle value", "hinge 1.angle rate"], ["gravity.1"], t_end=quarter, h=quarter / 60,
         method="adjoint",
     )  # fmt: skip
@@ -128,8 +129,8 @@ def test_direct_and_adjoint_agree_and_are_the_derivatives_of_whole_runs():
     """Differences of runs end at the rounding of the runs: 1e-12 of positions, 1e-9 of accelerations and forces."""
     system = crank()
     run = {"t_end": 0.03, "h": 2.5e-3}
-    direct = ff.sensitivities(system, OUTPUTS, PARAMETERS, **run)
-    adjoint = ff.sensitivities(system, OUTPUTS, PARAMETERS, method="adjoint", **run)
+    direct = ff.design.sensitivities(system, OUTPUTS, PARAMETERS, **run)
+    adjoint = ff.design.sensitivities(system, OUTPUTS, PARAMETERS, method="adjoint", **run)
     size = np.abs(direct.gradient).max(axis=1, keepdims=True)
     assert (np.abs(direct.gradient).min(axis=1) > 0).all()
     assert_allclose(adjoint.gradient / size, direct.gradient / size, rtol=0, atol=2 * AGREE)
@@ -145,9 +146,11 @@ def test_direct_and_adjoint_agree_and_are_the_derivatives_of_whole_runs():
 
 def test_values_are_those_of_the_run():
     system = crank()
-    found = ff.sensitivities(system, {"x": "x x", "rms": ("v x", "rms")}, ["bodies.rod.mass"], t_end=0.05, h=2.5e-3)
+    found = ff.design.sensitivities(
+        system, {"x": "x x", "rms": ("v x", "rms")}, ["bodies.rod.mass"], t_end=0.05, h=2.5e-3
+    )
     motion = ff.integrate(system, ff.GeneralizedAlpha(0.8, tolerance=1e-12, stabilized=False), 0.05, 2.5e-3)
-    measured = ff.measured(system, motion)
+    measured = ff.sensors.measured(system, motion)
     assert_allclose(found.values[0], measured["x"].columns["x"][-1], rtol=1e-11)
     assert_allclose(found.values[1], np.sqrt((measured["v"].columns["x"] ** 2).mean()), rtol=1e-9)
 
@@ -158,15 +161,15 @@ def test_what_is_taken_over_time_has_its_derivative(take):
     run = {"t_end": 0.015, "h": 3e-3}
     path = "joints.pin.marker_a.position.0"
     outputs = {"v": ("v x", take), "x": "x x"}
-    direct = ff.sensitivities(system, outputs, [path], **run)
-    adjoint = ff.sensitivities(system, outputs, [path], method="adjoint", **run)
+    direct = ff.design.sensitivities(system, outputs, [path], **run)
+    adjoint = ff.design.sensitivities(system, outputs, [path], method="adjoint", **run)
     assert_allclose(adjoint.gradient, direct.gradient, rtol=1e-8, atol=1e-12)
     from floatframe.design.studies.study_file import TAKES
 
     def output_value(value):
         changed = with_value(system, path, value)
         motion = ff.integrate(changed, ff.GeneralizedAlpha(0.8, tolerance=1e-13, stabilized=False), **run)
-        return TAKES[take](ff.measured(changed, motion)["v"].columns["x"])
+        return TAKES[take](ff.sensors.measured(changed, motion)["v"].columns["x"])
 
     p, step = value_at(system, path), 1e-4
     by_runs = (output_value(p + step) - output_value(p - step)) / (2 * step)
@@ -180,8 +183,8 @@ def test_a_flexible_body_by_its_modal_matrices(stiffened):
     paths = ["bodies.body.reduced.K.0.0", "bodies.body.reduced.K.0.1", "bodies.body.reduced.D.1.1", "gravity.2",
              "bodies.body.turn.0"]  # fmt: skip
     outputs, run = ["tip size", "mode q"], {"t_end": 0.048, "h": 4e-3}
-    direct = ff.sensitivities(system, outputs, paths, **run)
-    adjoint = ff.sensitivities(system, outputs, paths, method="adjoint", **run)
+    direct = ff.design.sensitivities(system, outputs, paths, **run)
+    adjoint = ff.design.sensitivities(system, outputs, paths, method="adjoint", **run)
     size = np.abs(direct.gradient).max(axis=1, keepdims=True)
     # by the turn both are a difference of large terms: neighbouring systems differ by up to 3e-10, either way
     assert_allclose(adjoint.gradient / size, direct.gradient / size, rtol=0, atol=4 * AGREE)
@@ -193,9 +196,9 @@ def test_a_flexible_body_by_its_modal_matrices(stiffened):
 
 def test_a_drive_by_its_amplitude_and_a_gear_by_its_ratio():
     system = slider_crank(angle=0.6, drive=harmonic(0.4, 6.0, phase=0.3, offset=0.6 - 0.4 * np.sin(0.3)))
-    system = replace(system, sensors=[ff.PlaceSensor("x", ff.Marker("slider"))])
+    system = replace(system, sensors=[ff.sensors.PlaceSensor("x", ff.Marker("slider"))])
     path = "joints.main.motions.angle.pieces.0.7"  # the angular frequency
-    found = ff.sensitivities(system, ["x x"], [path], t_end=0.06, h=3e-3)
+    found = ff.design.sensitivities(system, ["x x"], [path], t_end=0.06, h=3e-3)
     by_runs = differences_of_runs(system, path, ["x x"], 6e-2, t_end=0.06, h=3e-3)
     assert_allclose(found.gradient[0], by_runs, rtol=1e-7)
 
@@ -205,12 +208,12 @@ def test_equilibrium_of_a_hanging_mass_has_its_closed_form():
     body = ff.RigidBody("mass", 2.0, np.eye(3), position=(1.4, 0, 0))
     guide = ff.PrismaticJoint("guide", ff.Marker(ff.GROUND), ff.Marker("mass"), axis=(1, 0, 0))
     spring = ff.SpringDamper("spring", ff.Marker(ff.GROUND), ff.Marker("mass"), 40.0, 0.0, 1.0)
-    sensors = [ff.PlaceSensor("place", ff.Marker("mass")), ff.ReactionSensor("pull", "spring")]
+    sensors = [ff.sensors.PlaceSensor("place", ff.Marker("mass")), ff.sensors.ReactionSensor("pull", "spring")]
     system = ff.System([body], [guide], [spring, ff.Gravity((9.81, 0, 0))], sensors=sensors)
     paths = ["bodies.mass.mass", "forces.spring.stiffness", "forces.spring.free_length", "gravity.0"]
     expected = [[9.81 / 40, -2 * 9.81 / 1600, 1.0, 2 / 40], [9.81, 0.0, 0.0, 2.0]]
     for method in ("direct", "adjoint"):
-        found = ff.sensitivities(system, ["place x", "pull force x"], paths, analysis="static", method=method)
+        found = ff.design.sensitivities(system, ["place x", "pull force x"], paths, analysis="static", method=method)
         assert_allclose(found.values, [1 + 2 * 9.81 / 40, 2 * 9.81], rtol=1e-10)
         assert_allclose(found.gradient, expected, rtol=0, atol=1e-9)
     assert_allclose(found.relative[0, 3], 2 * 9.81 / 40 / found.values[0], rtol=1e-9)
@@ -220,7 +223,9 @@ def test_frequencies_of_an_oscillator_have_their_closed_form():
     k, c, m = 40.0, 0.6, 2.0
     paths = ["forces.spring.stiffness", "forces.spring.damping", "bodies.mass.mass"]
     system = oscillator(k, c, m)
-    found = ff.sensitivities(system, ["frequency 1", "damping 1", "real 1", "imaginary 1"], paths, analysis="modes")
+    found = ff.design.sensitivities(
+        system, ["frequency 1", "damping 1", "real 1", "imaginary 1"], paths, analysis="modes"
+    )
     w0 = np.sqrt(k / m)
     zeta = c / (2 * m * w0)
     w = np.sqrt(k / m - (c / (2 * m)) ** 2)
@@ -238,7 +243,7 @@ def test_a_frequency_follows_the_equilibrium_it_is_taken_about():
     spring = ff.JointForce("twist", "hinge 1", "angle", stiffness=9.0)
     system = replace(system, forces=(*system.forces, spring))
     paths = ["bodies.rod 1.mass", "forces.twist.stiffness", "bodies.rod 1.center_of_mass.0"]
-    found = ff.sensitivities(system, ["frequency 1"], paths, analysis="modes")
+    found = ff.design.sensitivities(system, ["frequency 1"], paths, analysis="modes")
     for k, path in enumerate(paths):
         p, step = value_at(system, path), 1e-3
 
@@ -254,11 +259,13 @@ def test_a_frequency_follows_the_equilibrium_it_is_taken_about():
 def test_a_repeated_frequency_splits_into_its_branches():
     """A mass on equal springs along x and y: the spring along x moves one branch, the other stays."""
     body = ff.RigidBody("mass", 2.0, np.eye(3))
-    hold = ff.ConstantOrientation("hold", ff.Marker(ff.GROUND), ff.Marker("mass"))
-    bush = ff.Bushing("bush", ff.Marker(ff.GROUND), ff.Marker("mass"), np.diag([50.0, 50.0, 90.0, 1.0, 1.0, 1.0]))
+    hold = ff.joints.ConstantOrientation("hold", ff.Marker(ff.GROUND), ff.Marker("mass"))
+    bush = ff.forces.Bushing(
+        "bush", ff.Marker(ff.GROUND), ff.Marker("mass"), np.diag([50.0, 50.0, 90.0, 1.0, 1.0, 1.0])
+    )
     system = ff.System([body], [hold], [bush])
     paths = ["forces.bush.stiffness.0.0", "forces.bush.stiffness.1.1", "bodies.mass.mass"]
-    found = ff.sensitivities(system, ["frequency 1", "frequency 2", "frequency 3"], paths, analysis="modes")
+    found = ff.design.sensitivities(system, ["frequency 1", "frequency 2", "frequency 3"], paths, analysis="modes")
     f = np.sqrt(50 / 2) / (2 * np.pi)
     assert found.repeated == ("frequency 1", "frequency 2")
     one = f / (2 * 50)
@@ -269,12 +276,12 @@ def test_a_repeated_frequency_splits_into_its_branches():
 def test_a_function_of_parameters_is_differentiated_too():
     """Both by the same path, and by a parameter that changes several numbers."""
     paths = ["forces.spring.stiffness"]
-    by_path = ff.sensitivities(oscillator(), ["place x"], paths, t_end=0.1, h=5e-3)
-    by_name = ff.sensitivities(
+    by_path = ff.design.sensitivities(oscillator(), ["place x"], paths, t_end=0.1, h=5e-3)
+    by_name = ff.design.sensitivities(
         lambda p: oscillator(k=p["k"], m=p["s"] * 2.0), ["place x"], {"k": 40.0, "s": 1.0}, t_end=0.1, h=5e-3
     )
     assert_allclose(by_name.of("place x", "k"), by_path.gradient[0, 0], rtol=1e-10)
-    by_mass = ff.sensitivities(oscillator(), ["place x"], ["bodies.mass.mass"], t_end=0.1, h=5e-3)
+    by_mass = ff.design.sensitivities(oscillator(), ["place x"], ["bodies.mass.mass"], t_end=0.1, h=5e-3)
     assert_allclose(by_name.of("place x", "s"), 2 * by_mass.gradient[0, 0], rtol=1e-9)
 
 
@@ -282,8 +289,8 @@ def test_bad_input_is_told():
     system, run = crank(), {"t_end": 0.01, "h": 1e-3}
 
     def refused(match, *, of=("x x",), parameters=("bodies.rod.mass",), made=system, **options):
-        with pytest.raises(ff.FloatframeError, match=match):
-            ff.sensitivities(made, list(of), list(parameters), **{**run, **options})
+        with pytest.raises(ff.errors.FloatframeError, match=match):
+            ff.design.sensitivities(made, list(of), list(parameters), **{**run, **options})
 
     refused("did you mean 'rod'", parameters=["bodies.rodd.mass"])
     refused("did you mean 'mass'", parameters=["bodies.rod.masss"])
@@ -298,10 +305,10 @@ def test_bad_input_is_told():
     refused("no method 'adjoined'", method="adjoined")
     refused("no analysis 'runs'", analysis="runs")
     refused("needs t_end and h", h=None)
-    refused("steps of Variational are not differentiated", integrator=ff.Variational())
+    refused("steps of Variational are not differentiated", integrator=ff.integrators.Variational())
     refused("take fixed steps", integrator=ff.GeneralizedAlpha(error_tolerance=1e-5))
     refused("no parameter 'mass'", steps={"mass": 0.1})
-    event = ff.Event("end", "x", 0.4, stop=True)
+    event = ff.simulation.Event("end", "x", 0.4, stop=True)
     refused("motions over events", made=replace(system, events=[event]))
     jump = ff.PointForce(
         "kick", ff.Marker("slider"), (1.0, 0, 0), amplitude=piecewise([0.0, 0.005], [constant(0.0), constant(1.0)])
@@ -315,8 +322,8 @@ def test_bad_input_is_told():
 def test_numbers_that_are_no_part_of_the_system_are_refused(tmp_path, path):
     """The end of a run moved the value, and its derivative came out as rounding about zero."""
     (tmp_path / "a.toml").write_text("[run]\nh = 1e-3\n")
-    with pytest.raises(ff.SystemFileError, match="not the system; expected a number of a body"):
-        ff.sensitivities(tmp_path / "a.toml", ["tip x"], [path])
+    with pytest.raises(ff.errors.SystemFileError, match="not the system; expected a number of a body"):
+        ff.design.sensitivities(tmp_path / "a.toml", ["tip x"], [path])
 
 
 def test_a_parameter_that_changes_what_a_system_is_made_of_is_refused():
@@ -326,13 +333,13 @@ def test_a_parameter_that_changes_what_a_system_is_made_of_is_refused():
             forces.append(ff.SpringDamper("s", ff.Marker(ff.GROUND), ff.Marker("rod 1", position=(1.0, 0, 0)), p["k"]))
         return replace(pendulum(), forces=forces)
 
-    with pytest.raises(ff.ModelError, match="'k' changes the topology"):
-        ff.sensitivities(made, ["hinge 1.angle value"], {"k": 1.0}, t_end=0.01, h=1e-3)
+    with pytest.raises(ff.errors.ModelError, match="'k' changes the topology"):
+        ff.design.sensitivities(made, ["hinge 1.angle value"], {"k": 1.0}, t_end=0.01, h=1e-3)
 
 
 def test_a_damping_of_zero_is_differentiated_from_its_side():
-    found = ff.sensitivities(oscillator(c=0.0), ["place x"], ["forces.spring.damping"], t_end=0.2, h=1e-2)
-    both = ff.sensitivities(oscillator(c=0.02), ["place x"], ["forces.spring.damping"], t_end=0.2, h=1e-2)
+    found = ff.design.sensitivities(oscillator(c=0.0), ["place x"], ["forces.spring.damping"], t_end=0.2, h=1e-2)
+    both = ff.design.sensitivities(oscillator(c=0.02), ["place x"], ["forces.spring.damping"], t_end=0.2, h=1e-2)
     assert found.gradient[0, 0] != 0
     assert_allclose(found.gradient, both.gradient, rtol=5e-3)
 
@@ -344,7 +351,7 @@ def governor(k=400.0, m=2.0, free=0.5):
     axle = ff.RevoluteJoint("axle", ff.Marker(ff.GROUND), ff.Marker("hub"), axis=(0, 0, 1))
     arm = ff.PrismaticJoint("arm", ff.Marker("hub"), ff.Marker("bob"), axis=(1, 0, 0))
     spring = ff.SpringDamper("spring", ff.Marker("hub"), ff.Marker("bob"), k, 3.0, free)
-    sensors = [ff.PlaceSensor("place", ff.Marker("bob")), ff.ReactionSensor("pull", "spring")]
+    sensors = [ff.sensors.PlaceSensor("place", ff.Marker("bob")), ff.sensors.ReactionSensor("pull", "spring")]
     return ff.System([hub, bob], [axle, arm], [spring], sensors=sensors)
 
 
@@ -354,7 +361,7 @@ def test_a_steady_rotation_has_its_closed_form(method):
     k, m, free, w = 400.0, 2.0, 0.5, 6.0
     paths = ["forces.spring.stiffness", "bodies.bob.mass", "forces.spring.free_length", "bodies.hub.mass"]
     system = governor(k, m, free)
-    found = ff.sensitivities(
+    found = ff.design.sensitivities(
         system, ["arm.distance value", "pull force size", "place size"], paths, analysis="rotation",
         omega=(0, 0, w), method=method,
     )  # fmt: skip
@@ -373,11 +380,11 @@ def test_a_steady_rotation_of_a_flexible_body_and_differences_of_its_solutions()
     joint = ff.RevoluteJoint("hinge", ff.Marker(ff.GROUND), ff.Marker("body", "end_a"), axis=(0, 0, 1))
     system = replace(base, joints=[joint], forces=[])
     path, omega = "bodies.body.reduced.K.1.1", (0, 0, 1.5)
-    found = ff.sensitivities(system, ["mode q"], [path], analysis="rotation", omega=omega)
+    found = ff.design.sensitivities(system, ["mode q"], [path], analysis="rotation", omega=omega)
     p = value_at(system, path)
 
     def value(at):
-        about = ff.steady_rotation(with_value(system, path, at), omega, tolerance=1e-13)
+        about = ff.analyses.steady_rotation(with_value(system, path, at), omega, tolerance=1e-13)
         return about.state.q[1]
 
     step = 1e-2 * p
@@ -390,13 +397,13 @@ def test_a_steady_rotation_of_a_flexible_body_and_differences_of_its_solutions()
 def test_a_body_without_a_position_varies_about_where_its_joints_place_it(path):
     """The joint turns the block, so that a block with the identity would begin in another configuration."""
     post, own = ff.Marker(ff.GROUND, position=(0.7, -0.4, 0.9)), ff.Marker("block", position=(0.1, 0.2, 0.0))
-    rail = ff.CylindricalJoint("rail", post, own, axis=(0.48, -0.6, 0.64), axis_b=(0, 0, 1))
+    rail = ff.joints.CylindricalJoint("rail", post, own, axis=(0.48, -0.6, 0.64), axis_b=(0, 0, 1))
     spring = ff.SpringDamper("spring", ff.Marker(ff.GROUND, position=(1, 2, 3)), ff.Marker("block"), 30.0)
-    place = ff.PlaceSensor("place", ff.Marker("block", position=(0.3, 0.0, 0.1)))
+    place = ff.sensors.PlaceSensor("place", ff.Marker("block", position=(0.3, 0.0, 0.1)))
     block = ff.RigidBody("block", 2.0, np.diag([0.1, 0.2, 0.25]), center_of_mass=(0.1, 0, 0))
     free = ff.System([block], [rail], [ff.Gravity((0, 0, -9.81)), spring], sensors=[place])
     given = replace(free, bodies=placed_bodies(free))
-    found, expected = (ff.sensitivities(each, ["place x"], [path], t_end=0.1, h=1e-3) for each in (free, given))
+    found, expected = (ff.design.sensitivities(each, ["place x"], [path], t_end=0.1, h=1e-3) for each in (free, given))
     assert_allclose(value_at(free, path), value_at(given, path), rtol=0, atol=1e-15)
     if path.startswith("bodies"):
         assert_allclose(found.gradient, expected.gradient, rtol=1e-6, atol=0)
@@ -408,25 +415,25 @@ def test_a_body_without_a_position_varies_about_where_its_joints_place_it(path):
 def test_what_a_turn_changes_has_no_derivative():
     system = governor()
     given = {"parameters": ["bodies.bob.mass"], "analysis": "rotation", "omega": (0, 0, 6.0)}
-    with pytest.raises(ff.ModelError, match="'place y' changes as the system rotates"):
-        ff.sensitivities(system, ["place y"], **given)
-    with pytest.raises(ff.ModelError, match="a steady rotation needs omega"):
-        ff.sensitivities(system, ["place x"], ["bodies.bob.mass"], analysis="rotation")
-    with pytest.raises(ff.ModelError, match="other than 0"):
-        ff.sensitivities(system, ["place x"], **{**given, "omega": (0, 0, 0)})
-    with pytest.raises(ff.ModelError, match="belongs to analysis"):
-        ff.sensitivities(system, ["place x"], ["bodies.bob.mass"], analysis="static", omega=(0, 0, 1))
+    with pytest.raises(ff.errors.ModelError, match="'place y' changes as the system rotates"):
+        ff.design.sensitivities(system, ["place y"], **given)
+    with pytest.raises(ff.errors.ModelError, match="a steady rotation needs omega"):
+        ff.design.sensitivities(system, ["place x"], ["bodies.bob.mass"], analysis="rotation")
+    with pytest.raises(ff.errors.ModelError, match="other than 0"):
+        ff.design.sensitivities(system, ["place x"], **{**given, "omega": (0, 0, 0)})
+    with pytest.raises(ff.errors.ModelError, match="belongs to analysis"):
+        ff.design.sensitivities(system, ["place x"], ["bodies.bob.mass"], analysis="static", omega=(0, 0, 1))
 
 
 def test_elements_with_states_of_their_own_are_refused():
-    with pytest.raises(ff.ModelError, match="'jack' has states, which are not differentiated"):
-        ff.sensitivities(lifted(), ["rail.distance value"], ["bodies.b.mass"], t_end=0.02, h=1e-3)
+    with pytest.raises(ff.errors.ModelError, match="'jack' has states, which are not differentiated"):
+        ff.design.sensitivities(lifted(), ["rail.distance value"], ["bodies.b.mass"], t_end=0.02, h=1e-3)
 
 
 def test_contacts_whose_steps_are_divided_are_refused():
     ground, body = ff.Marker("ground"), ff.Marker("b")
-    foot = ff.SphereContact("foot", ground, body, radius_b=0.1, stiffness=1e5)
+    foot = ff.forces.SphereContact("foot", ground, body, radius_b=0.1, stiffness=1e5)
     rail = ff.PrismaticJoint("rail", ground, body, axis=(0, 0, 1))
     system = ff.System([ff.RigidBody("b", 1.0, np.eye(3))], [rail], [foot])
-    with pytest.raises(ff.ModelError, match="contact 'foot' divides the step in which it closes, which is not"):
-        ff.sensitivities(system, ["rail.distance value"], ["bodies.b.mass"], t_end=0.02, h=1e-3)
+    with pytest.raises(ff.errors.ModelError, match="contact 'foot' divides the step in which it closes, which is not"):
+        ff.design.sensitivities(system, ["rail.distance value"], ["bodies.b.mass"], t_end=0.02, h=1e-3)

@@ -7,20 +7,11 @@ import numpy as np
 import cms
 import fe_models as fm
 from fe_models.foundation.units import unit_system
-from floatframe import (
-    Bushing,
-    FixedJoint,
-    FlexibleBody,
-    Gravity,
-    Marker,
-    PlaceSensor,
-    ReactionSensor,
-    RevoluteJoint,
-    RigidBody,
-    System,
-)
+from floatframe import FixedJoint, FlexibleBody, Gravity, Marker, RevoluteJoint, RigidBody, System
 from floatframe.design.identification.scaled_link import scaled_link
+from floatframe.forces import Bushing
 from floatframe.model.functions.time_functions import sampled
+from floatframe.sensors import PlaceSensor, ReactionSensor
 
 LENGTH = 1.0
 #: hub inertia [kg m²], payload [kg], factors of the link's density and modulus, damping ratio, viscous friction [N m s]
@@ -33,10 +24,10 @@ NOISE = np.array([0.02, 2e-4, 0.05, 0.05])  #: of a torque sensor [N m], an opti
 @cache
 def link(E=7e10, rho=2700.0):
     """An aluminium strip of 50 mm by 8 mm that bends in the plane, two modes, its frame held at the root."""
-    section = fm.GeneralSection(A=4e-4, Iy=2.13e-9, Iz=2.13e-9, J=8e-9)
-    mesh = fm.straight_line((0, 0, 0), (LENGTH, 0, 0), 8)
-    places = [fm.line_interface(mesh, name, fm.NodeIndices((k,))) for name, k in (("root", 0), ("tip", 8))]
-    strip = fm.BeamProperty(section, fm.Material("aluminium", E=E, nu=0.3, rho=rho), orientation=(0, 1, 0))
+    section = fm.beams.GeneralSection(A=4e-4, Iy=2.13e-9, Iz=2.13e-9, J=8e-9)
+    mesh = fm.beams.straight_line((0, 0, 0), (LENGTH, 0, 0), 8)
+    places = [fm.beams.line_interface(mesh, name, fm.beams.NodeIndices((k,))) for name, k in (("root", 0), ("tip", 8))]
+    strip = fm.beams.BeamProperty(section, fm.Material("aluminium", E=E, nu=0.3, rho=rho), orientation=(0, 1, 0))
     body = fm.planar(cms.couple(fm.beam_body(mesh, strip, name="link", units=unit_system("m-kg-s"), interfaces=places)))
     return cms.reduce(body, cms.craig_bampton(body, n_modes=1), frame=cms.NodalFrame("root"), geometric=True)
 

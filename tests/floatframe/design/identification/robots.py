@@ -2,19 +2,8 @@
 
 import numpy as np
 
-from floatframe import (
-    CylindricalJoint,
-    FixedJoint,
-    Gravity,
-    Marker,
-    PlanarJoint,
-    PrismaticJoint,
-    RevoluteJoint,
-    RigidBody,
-    SphericalJoint,
-    System,
-    UniversalJoint,
-)
+from floatframe import FixedJoint, Gravity, Marker, PrismaticJoint, RevoluteJoint, RigidBody, SphericalJoint, System
+from floatframe.joints import CylindricalJoint, PlanarJoint, UniversalJoint
 from floatframe.model.rotations import euler_parameters, rotation_matrix
 
 DOWN = (0.0, 0.0, -9.81)

@@ -7,9 +7,11 @@ import pytest
 import scipy.linalg as la
 from numpy.testing import assert_allclose
 
-from floatframe import Gravity, Marker, ModelError, PrismaticJoint, RevoluteJoint, ScrewJoint, System
+from floatframe import Gravity, Marker, PrismaticJoint, RevoluteJoint, System
 from floatframe.design.identification.base_parameters import SOURCES, base_parameters, random_samples
 from floatframe.design.identification.regressors import linear_form
+from floatframe.errors import ModelError
+from floatframe.joints import ScrewJoint
 from tests.floatframe.design.identification.robots import KUKA_LIKE, human, random_tree, six_axes, some_body
 
 GRAVITIES = {"along the first axis": (0, 0, -9.81), "none": (0, 0, 0), "across it": (0, -9.81, 0)}

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import ModelError
 from floatframe.design.identification.base_parameters import base_parameters
 from floatframe.design.identification.estimation import Measured, estimate
 from floatframe.design.identification.excitation import ExcitingMotion, MotionLimits, exciting_motion
@@ -12,6 +11,7 @@ from floatframe.design.identification.inertial_parameters import pseudo_inertia
 from floatframe.design.identification.physical import log_cholesky, parameters_of_cholesky, real_parameters
 from floatframe.design.identification.regressors import linear_form
 from floatframe.design.identification.tree_samples import tree_samples
+from floatframe.errors import ModelError
 from tests.floatframe.design.identification.robots import KUKA_LIKE, six_axes
 
 NOISE = np.array([8.0, 12.0, 6.0, 2.0, 1.5, 1.0])

@@ -8,13 +8,15 @@ import pytest
 from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
-from floatframe import ModelError, linear_form, read_system, tree_samples
+from floatframe import read_system
 from floatframe.cli.app import app
+from floatframe.design.identification import linear_form, tree_samples
 from floatframe.design.identification.estimation import Measured, estimate
 from floatframe.design.identification.excitation import ExcitingMotion
 from floatframe.design.identification.measured_file import read_measured
 from floatframe.design.identification.next_motion import next_motion
 from floatframe.design.identification.physical import real_parameters
+from floatframe.errors import ModelError
 
 ROBOT = """
 [system]

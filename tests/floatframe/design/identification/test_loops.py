@@ -7,20 +7,13 @@ import pytest
 import scipy.linalg as la
 from numpy.testing import assert_allclose
 
-from floatframe import (
-    CoordinateCoupler,
-    JointCoordinate,
-    Marker,
-    ModelError,
-    PrismaticJoint,
-    RevoluteJoint,
-    System,
-    inverse_dynamics,
-)
+from floatframe import Marker, PrismaticJoint, RevoluteJoint, System, inverse_dynamics
 from floatframe.design.identification.base_parameters import base_parameters, random_samples
 from floatframe.design.identification.estimation import Measured, estimate
 from floatframe.design.identification.measured_file import measured_coordinates, read_measured
 from floatframe.design.identification.regressors import linear_form
+from floatframe.errors import ModelError
+from floatframe.joints import CoordinateCoupler, JointCoordinate
 from floatframe.model.functions.time_functions import harmonic
 from tests.floatframe.design.identification.robots import palletizer, some_body
 

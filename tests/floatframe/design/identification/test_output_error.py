@@ -6,18 +6,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import (
-    Marker,
-    ModelError,
-    PlaceSensor,
-    PrismaticJoint,
-    RigidBody,
-    SpringDamper,
-    System,
-    sensitivities,
-)
+from floatframe import Marker, PrismaticJoint, RigidBody, SpringDamper, System
+from floatframe.design import sensitivities
 from floatframe.design.identification.output_error import MeasuredOutputs, computed_outputs, fit_outputs
 from floatframe.design.identification.scaled_link import scaled_body, scaled_link
+from floatframe.errors import ModelError
+from floatframe.sensors import PlaceSensor
 from tests.floatframe.design.identification.flexible_arm import NOISE, OUTPUTS, TRUTH, arm, link
 
 TIME = np.arange(61) * 0.05

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import Gravity, Marker, ModelError, RevoluteJoint, System
+from floatframe import Gravity, Marker, RevoluteJoint, System
 from floatframe.design.identification.barycentric import barycentric_parameters
 from floatframe.design.identification.base_parameters import random_samples
 from floatframe.design.identification.inertial_parameters import (
@@ -17,6 +17,7 @@ from floatframe.design.identification.regressors import linear_form
 from floatframe.design.identification.tree_samples import tree_samples
 from floatframe.engine.initial_conditions.initial import consistent_motion
 from floatframe.engine.tree.recursive import relative_model
+from floatframe.errors import ModelError
 from tests.floatframe.design.identification.robots import DOWN, random_tree, six_axes, some_body
 
 KINDS = ("R", "P", "C", "U", "L", "F")

@@ -122,11 +122,13 @@ def result(folder):
 
 
 def test_every_combination_is_a_case_and_parts_have_mean_axes():
-    cases = ff.grid(n_modes=(1, 2), frames=("nodal:root", "tisserand"), stiffening=(True, False), parts=(1, 2))
+    cases = ff.design.laboratory.grid(
+        n_modes=(1, 2), frames=("nodal:root", "tisserand"), stiffening=(True, False), parts=(1, 2)
+    )
     assert len(cases) == 2 * 2 * 2 + 2 * 2  # the frame does not matter to parts
     assert {case.frame for case in cases if case.parts == 2} == {"tisserand"}
     with pytest.raises(ModelError, match="\"nodal:INTERFACE\", got 'nodal'"):
-        ff.Case(frame="nodal")
+        ff.design.laboratory.Case(frame="nodal")
 
 
 def test_a_body_in_the_place_of_itself_changes_nothing(folder):
@@ -143,9 +145,9 @@ def test_stiffening_and_parts_come_near_the_reference_and_a_linear_frame_does_no
     """At this speed the range of a linear frame ends (a note says so), and truncation is no matter."""
     by_case = {row.case: row for row in result.cases}
     assert not [row.failure for row in result.cases if row.failure]
-    linear = by_case[ff.Case("craig-bampton", 2, "nodal:root", False, 1)]
-    stiff = by_case[ff.Case("craig-bampton", 2, "nodal:root", True, 1)]
-    parts = by_case[ff.Case("craig-bampton", 2, "tisserand", True, 2)]
+    linear = by_case[ff.design.laboratory.Case("craig-bampton", 2, "nodal:root", False, 1)]
+    stiff = by_case[ff.design.laboratory.Case("craig-bampton", 2, "nodal:root", True, 1)]
+    parts = by_case[ff.design.laboratory.Case("craig-bampton", 2, "tisserand", True, 2)]
     assert linear.error > 3 * stiff.error
     assert parts.error < linear.error / 3
     assert any("left the range of its linear frame" in note for note in linear.notes)
@@ -173,9 +175,9 @@ def test_a_reference_from_elsewhere(folder, tmp_path):
     t = np.linspace(0.0, 1.0, 2001)
     s = t**3 * (10 - 15 * t + 6 * t**2)
     x, y = 1000 * np.cos(8 * s), 5 + 1000 * np.sin(8 * s)
-    reference = ff.Reference("a rigid blade", t, {"tip x": x, "tip y": y})
-    case = ff.Case("craig-bampton", 2, "nodal:root", True, 1)
-    found = ff.study(
+    reference = ff.design.laboratory.Reference("a rigid blade", t, {"tip x": x, "tip y": y})
+    case = ff.design.laboratory.Case("craig-bampton", 2, "nodal:root", True, 1)
+    found = ff.design.laboratory.study(
         system, "blade", folder / "blade.toml", [case], integrator=run.integrator, t_end=1.0, h=run.h,
         reference=reference, sensors=["tip"],
     )  # fmt: skip
@@ -201,8 +203,11 @@ def test_a_reference_from_elsewhere(folder, tmp_path):
 
 def test_a_case_that_fails_is_a_row(folder):
     system, run = read_system(folder / "spin.toml")
-    good, bad = ff.Case(n_modes=1, frame="nodal:root"), ff.Case(n_modes=1, frame="nodal:nowhere")
-    found = ff.study(
+    good, bad = (
+        ff.design.laboratory.Case(n_modes=1, frame="nodal:root"),
+        ff.design.laboratory.Case(n_modes=1, frame="nodal:nowhere"),
+    )
+    found = ff.design.laboratory.study(
         system,
         "blade",
         folder / "blade.toml",
@@ -221,16 +226,26 @@ def test_what_is_refused(folder):
     system, run = read_system(folder / "spin.toml")
 
     def study(**changes):
-        given = {"system": system, "body": "blade", "job": folder / "blade.toml", "cases": [ff.Case(n_modes=1)]}
-        given |= {"integrator": run.integrator, "t_end": 0.02, "h": run.h, "reference": ff.Case(n_modes=1)} | changes
-        return ff.study(**given)
+        given = {
+            "system": system,
+            "body": "blade",
+            "job": folder / "blade.toml",
+            "cases": [ff.design.laboratory.Case(n_modes=1)],
+        }
+        given |= {
+            "integrator": run.integrator,
+            "t_end": 0.02,
+            "h": run.h,
+            "reference": ff.design.laboratory.Case(n_modes=1),
+        } | changes
+        return ff.design.laboratory.study(**given)
 
     with pytest.raises(ModelError, match=r"no body 'blad'.*'blade'"):
         study(body="blad")
     with pytest.raises(ModelError, match="expected some of tip, load; got hub"):
         study(sensors=["hub"])
     with pytest.raises(ModelError, match="expected a moving column"):
-        study(reference=ff.Reference("other", np.array([0.0, 1.0]), {"hub x": np.array([0.0, 1.0])}))
+        study(reference=ff.design.laboratory.Reference("other", np.array([0.0, 1.0]), {"hub x": np.array([0.0, 1.0])}))
     with pytest.raises(ModelError, match="at least one case"):
         study(cases=[])
 
@@ -265,24 +280,26 @@ def test_command_and_picture(folder, result, tmp_path, capsys, monkeypatch):
 def test_the_full_model_is_where_cases_lead(folder, tmp_path):
     """Unreduced inside the system: distances from it fall with the modes, down to modes of it that no step resolves."""
     system, run = read_system(folder / "spin.toml")
-    found = ff.study(
-        system, "blade", folder / "blade.toml", ff.grid(mode_sets=("craig-bampton-ir",), n_modes=(0, 2, 6)),
-        integrator=run.integrator, t_end=0.2, h=run.h, reference=ff.FullModel(), sensors=["tip"],
+    found = ff.design.laboratory.study(
+        system, "blade", folder / "blade.toml",
+        ff.design.laboratory.grid(mode_sets=("craig-bampton-ir",), n_modes=(0, 2, 6)),
+        integrator=run.integrator, t_end=0.2, h=run.h, reference=ff.design.laboratory.FullModel(), sensors=["tip"],
     )  # fmt: skip
     errors = [row.error for row in found.cases]
     assert errors[0] > 10 * errors[1]
     assert errors[0] > 10 * errors[2] > 0
     assert "full finite element model" in found.reference
     with pytest.raises(ModelError, match=r"full model of body 'blade' has \d+ dofs, more than 20"):
-        ff.study(
-            system, "blade", folder / "blade.toml", [ff.Case(n_modes=1)], integrator=run.integrator, t_end=0.1, h=run.h,
-            reference=ff.FullModel(most_dofs=20),
+        ff.design.laboratory.study(
+            system, "blade", folder / "blade.toml", [ff.design.laboratory.Case(n_modes=1)],
+            integrator=run.integrator, t_end=0.1, h=run.h,
+            reference=ff.design.laboratory.FullModel(most_dofs=20),
         )  # fmt: skip
     text = LABORATORY[: LABORATORY.index("[reference]")]
     for name in ("spin.toml", "blade.toml"):
         text = text.replace(f'"{name}"', f'"{folder / name}"')
     (tmp_path / "full.toml").write_text(text + '[reference]\nkind = "full-model"\nmost_dofs = 500\n')
-    assert read_laboratory(tmp_path / "full.toml").reference.asked == ff.FullModel(500)
+    assert read_laboratory(tmp_path / "full.toml").reference.asked == ff.design.laboratory.FullModel(500)
     (tmp_path / "both.toml").write_text(text + '[reference]\nkind = "full-model"\nn_modes = 5\n')
     with pytest.raises(ModelError, match='kind "full-model" expected no n_modes'):
         read_laboratory(tmp_path / "both.toml")
@@ -312,14 +329,14 @@ def test_cases_share_one_factorisation_and_one_search_for_modes(folder, monkeypa
             return of(*given, **names)
 
         monkeypatch.setattr(module, name, counted)
-    cases = ff.grid(
+    cases = ff.design.laboratory.grid(
         mode_sets=("craig-bampton", "craig-bampton-ir"), n_modes=(1, 2, 4), frames=("nodal:root", "tisserand")
     )
     with BodyShelf(folder / "blade.toml", cases=cases) as shelf:
         bodies = {case: shelf.reduced(case)[0] for case in cases}
         assert counts == {"fix_interfaces": 1, "fixed_interface_modes": 1}
     alone = reduce_job(folder / "blade.toml")
-    shared = bodies[ff.Case("craig-bampton", 4, "nodal:root")]
+    shared = bodies[ff.design.laboratory.Case("craig-bampton", 4, "nodal:root")]
     assert_allclose(np.diag(shared.K), np.diag(alone.K), rtol=1e-9)
     assert_allclose(shared.geometric.spin, alone.geometric.spin, rtol=0, atol=1e-6 * np.abs(alone.geometric.spin).max())
 
@@ -389,7 +406,8 @@ def test_exact_beams_are_a_reference_for_bodies_of_lines(tmp_path):
 def test_exact_beams_of_a_solid_are_refused(folder):
     system, run = read_system(folder / "spin.toml")
     with pytest.raises(ModelError, match="not made of beams alone"):
-        ff.study(
-            system, "blade", folder / "blade.toml", [ff.Case(n_modes=1)], integrator=run.integrator, t_end=0.1, h=run.h,
-            reference=ff.ExactBeam(),
+        ff.design.laboratory.study(
+            system, "blade", folder / "blade.toml", [ff.design.laboratory.Case(n_modes=1)],
+            integrator=run.integrator, t_end=0.1, h=run.h,
+            reference=ff.design.laboratory.ExactBeam(),
         )  # fmt: skip

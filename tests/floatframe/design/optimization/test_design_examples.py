@@ -8,12 +8,14 @@ from numpy.testing import assert_allclose
 from scipy.optimize import least_squares, minimize, minimize_scalar
 from typer.testing import CliRunner
 
-from floatframe import SystemFileError, linearize, optimize, read_design, read_system
+from floatframe import linearize, read_system
 from floatframe.cli.app import app
 from floatframe.cli.fits import best_system
+from floatframe.design import optimize, read_design
 from floatframe.design.optimization.design import Quantity
 from floatframe.design.optimization.evaluation import EvaluationFunction, response_number
 from floatframe.design.studies.study_file import Output
+from floatframe.errors import SystemFileError
 from floatframe.machines import copy_machine
 
 MU = 0.1

@@ -8,8 +8,9 @@ import pytest
 from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
-from floatframe import ModelError, ResultsError, SystemFileError, optimize, read_design
 from floatframe.cli.app import app
+from floatframe.design import optimize, read_design
+from floatframe.errors import ModelError, ResultsError, SystemFileError
 from tests.floatframe.cli.examples import PENDULUM
 
 FOUR_BAR = """

@@ -11,10 +11,11 @@ from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
 from fe_models.foundation.toml_file import FileContent, changed
-from floatframe import GeneralizedAlpha, SystemFileError, integrate
+from floatframe import GeneralizedAlpha, integrate
 from floatframe.cli.app import app
 from floatframe.design.studies.study import run_study
 from floatframe.design.studies.study_file import read_study
+from floatframe.errors import SystemFileError
 from floatframe.files.system_file.read_system import read_system
 from floatframe.results.sensors import measured
 from tests.floatframe.cli.examples import PENDULUM

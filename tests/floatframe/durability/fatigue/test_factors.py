@@ -3,7 +3,7 @@
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import assess, read_fatigue
+from floatframe.durability.fatigue import assess, read_fatigue
 from floatframe.durability.fatigue.fatigue_file import (
     reliability_factor,
     roughness_factor,

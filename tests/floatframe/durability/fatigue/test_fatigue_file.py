@@ -11,8 +11,9 @@ from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
 from cms.body.modal_file.file import write
-from floatframe import assess, basquin_curve, equivalent_repeats, history_damage, read_fatigue, read_results
+from floatframe import read_results
 from floatframe.cli.app import app
+from floatframe.durability.fatigue import assess, basquin_curve, equivalent_repeats, history_damage, read_fatigue
 from floatframe.durability.fatigue.criteria import Criterion
 from floatframe.durability.fatigue.load_blocks import LoadBlock, block_of_results
 from floatframe.durability.fatigue.mean_stress import MeanStress

@@ -9,7 +9,14 @@ from numpy.testing import assert_allclose
 import cms
 import fe_models as fm
 from fe_models.foundation.documents.html import html_page
-from floatframe import FatigueMaterial, MeanStress, assess, basquin_curve, history_damage, read_fatigue
+from floatframe.durability.fatigue import (
+    FatigueMaterial,
+    MeanStress,
+    assess,
+    basquin_curve,
+    history_damage,
+    read_fatigue,
+)
 from floatframe.durability.fatigue.criteria import Criterion
 from floatframe.durability.fatigue.fatigue_file import FatigueFile
 from floatframe.durability.fatigue.load_blocks import LoadBlock
@@ -175,7 +182,7 @@ def test_points_of_a_material_stand_for_the_nodes_of_its_border(tmp_path):
     ends = [
         fm.Interface(n, "rigid", mesh.node_sets[n], mesh.nodes[mesh.node_sets[n]].mean(0)) for n in ("left", "right")
     ]
-    coupled = cms.couple(fm.element_points(block.with_interfaces(*ends), "borders"))
+    coupled = cms.couple(fm.body.element_points(block.with_interfaces(*ends), "borders"))
     body = cms.reduce(coupled, cms.craig_bampton(coupled, n_modes=2))
     given = {"sn_exponent": 5.0, "fatigue_strength": 1e8, "stress_unit": "Pa"}
     keys = {key: value for key, value in given.items() if key in PlacesSection.model_fields}

@@ -16,7 +16,7 @@ from floatframe.errors import FatigueError
 from tests.bodies import bar
 
 NODE = 5
-LEVEL = ff.Level.of([(20, 1e-3), (100, 1e-2), (2000, 1e-2)], "g2/Hz")
+LEVEL = ff.durability.shaking.Level.of([(20, 1e-3), (100, 1e-2), (2000, 1e-2)], "g2/Hz")
 
 
 @pytest.fixture(scope="module")
@@ -28,9 +28,13 @@ def body():
 @pytest.fixture(scope="module")
 def shaken(body):
     place = body.frame.origin + body.frame.axes @ body.nodes[NODE]
-    test = ff.RandomTest("noise", LEVEL, ("x", "z"), duration=60.0)
-    wanted = [ff.Observed("a", position=place, quantities=("stress",))]
-    return ff.shake(ff.ShakeJob(body, "left", damping=ff.Damping(Q=20), outputs=wanted, random=[test])), test
+    test = ff.durability.shaking.RandomTest("noise", LEVEL, ("x", "z"), duration=60.0)
+    wanted = [ff.durability.shaking.Observed("a", position=place, quantities=("stress",))]
+    return ff.durability.shaking.shake(
+        ff.durability.shaking.ShakeJob(
+            body, "left", damping=ff.durability.shaking.Damping(Q=20), outputs=wanted, random=[test]
+        )
+    ), test
 
 
 def test_moments_are_those_of_the_shaken_stress(body, shaken):
@@ -53,7 +57,7 @@ def test_moments_are_those_of_the_shaken_stress(body, shaken):
 
 def test_damage_of_a_random_test_grows_with_its_duration_and_adds_its_directions(body, shaken):
     result, test = shaken
-    curve = ff.basquin_curve(1e6, 1e6, 5.0, least_cycles=1e-12)
+    curve = ff.durability.fatigue.basquin_curve(1e6, 1e6, 5.0, least_cycles=1e-12)
     both = shaken_damage(body, result.model, test, result.random, curve)
     each = [shaken_damage(body, result.model, test, [run], curve, duration=120.0) for run in result.random]
     assert both.block_names == ("noise left:x", "noise left:z")
@@ -70,12 +74,12 @@ def test_a_fatigue_file_names_a_shake_file(body, shaken, tmp_path):
     write(body, tmp_path / "bar.h5")
     (tmp_path / "bar_shake.toml").write_text(SHAKE)
     (tmp_path / "job.toml").write_text(FATIGUE)
-    made = ff.assess(ff.read_fatigue(tmp_path / "job.toml"))
-    curve = ff.basquin_curve(1e6, 1e6, 5.0, least_cycles=1e-12)
+    made = ff.durability.fatigue.assess(ff.durability.fatigue.read_fatigue(tmp_path / "job.toml"))
+    curve = ff.durability.fatigue.basquin_curve(1e6, 1e6, 5.0, least_cycles=1e-12)
     assert_allclose(made.result.damage, shaken_damage(body, result.model, test, result.random, curve).damage, rtol=1e-6)
     (tmp_path / "job.toml").write_text(FATIGUE.replace('"noise"', '"noisy"'))
     with pytest.raises(FatigueError, match="no random test 'noisy'; did you mean 'noise'"):
-        ff.assess(ff.read_fatigue(tmp_path / "job.toml"))
+        ff.durability.fatigue.assess(ff.durability.fatigue.read_fatigue(tmp_path / "job.toml"))
 
 
 FATIGUE = """

@@ -78,7 +78,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def result(folder):
-    return ff.shake(ff.read_shake(folder / "bar.toml"))
+    return ff.durability.shaking.shake(ff.durability.shaking.read_shake(folder / "bar.toml"))
 
 
 def test_the_command_writes_page_record_and_table(folder):
@@ -107,7 +107,7 @@ def test_the_options_of_a_modal_file_make_the_same_run(folder):
     found = CliRunner().invoke(app, ["shake", str(folder / "bar.h5"), *options])
     assert found.exit_code == 0, found.output
     own = {row["output"]: row["value"] for row in json.loads(found.stdout)["table"]}
-    job = ff.shake(ff.read_shake(folder / "bar.toml"))
+    job = ff.durability.shaking.shake(ff.durability.shaking.read_shake(folder / "bar.toml"))
     names = [output.name for output in job.sine[0].outputs]
     expected = job.sine[0].peaks[names.index("tip acceleration z")] / 9.80665
     assert_allclose(own["right acceleration z"], expected, rtol=1e-12)
@@ -161,7 +161,7 @@ def test_a_file_takes_bands_with_slopes_and_damped_sines(folder):
     assert old in text
     path = folder / "slopes.toml"
     path.write_text(text.replace(old, new))
-    job = ff.read_shake(path)
+    job = ff.durability.shaking.read_shake(path)
     assert_allclose(job.random[0].level.at(np.array([20.0, 100, 2000])), [0.01, 0.04, 0.007], rtol=0.01)
     shock = next(test for test in job.shock if test.name == "pulse")
     assert_allclose(shock.synthesis.target[0], 50 / 3 ** (6 / 20 / np.log10(2)), rtol=1e-12)
@@ -171,8 +171,8 @@ def test_a_file_takes_bands_with_slopes_and_damped_sines(folder):
                        (('"+6 dB/oct"', '"+6 dB"'), "expected a slope"),
                        (('[300, 1000, 50]', '[300, 1000, true]'), "band 2: expected")):  # fmt: skip
         path.write_text(text.replace(old, new).replace(*bad))
-        with pytest.raises((SystemFileError, ff.ModelError), match=words):
-            ff.read_shake(path)
+        with pytest.raises((SystemFileError, ff.errors.ModelError), match=words):
+            ff.durability.shaking.read_shake(path)
 
 
 def test_a_transient_takes_accelerations_and_forces_of_a_file(result):
@@ -236,4 +236,4 @@ def test_levels_of_a_file_are_told_with_their_line(folder):
     path = folder / "bad.toml"
     path.write_text((folder / "bar.toml").read_text().replace("level.csv", "wrong.csv"))
     with pytest.raises(SystemFileError, match=r"wrong.csv, line 2: -0.04 g2/Hz at 80 Hz"):
-        ff.read_shake(path)
+        ff.durability.shaking.read_shake(path)

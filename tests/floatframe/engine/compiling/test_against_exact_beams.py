@@ -28,10 +28,11 @@ FRAMES = {
 
 def reduced_beam(frame, n_modes=6):
     """A beam along x from the origin, with interfaces at both ends and in the middle."""
-    mesh = fm.straight_line((0, 0, 0), (LENGTH, 0, 0), 20)
-    section = fm.BeamProperty(fm.Rectangle(WIDTH, HEIGHT), SOFT, orientation=(0, 1, 0))
+    mesh = fm.beams.straight_line((0, 0, 0), (LENGTH, 0, 0), 20)
+    section = fm.beams.BeamProperty(fm.beams.Rectangle(WIDTH, HEIGHT), SOFT, orientation=(0, 1, 0))
     ends = [
-        fm.line_interface(mesh, end, fm.NodeIndices((k,))) for end, k in (("start", 0), ("middle", 10), ("end", 20))
+        fm.beams.line_interface(mesh, end, fm.beams.NodeIndices((k,)))
+        for end, k in (("start", 0), ("middle", 10), ("end", 20))
     ]
     body = cms.couple(fm.beam_body(mesh, section, name="beam", units=cms.unit_system("m-kg-s"), interfaces=ends))
     return cms.reduce(body, cms.craig_bampton(body, n_modes=n_modes), frame=FRAMES[frame], geometric=False)
@@ -39,7 +40,7 @@ def reduced_beam(frame, n_modes=6):
 
 def exact_beam(start, end):
     A, inertia = WIDTH * HEIGHT, WIDTH * HEIGHT**3 / 12
-    properties = fm.Rectangle(WIDTH, HEIGHT).properties(SOFT.nu)
+    properties = fm.beams.Rectangle(WIDTH, HEIGHT).properties(SOFT.nu)
     shear = SOFT.E / (2 * (1 + SOFT.nu)) * properties.A_sy
     return ExactBeam(start, end, 8, SOFT.E * A, shear, SOFT.E * inertia, SOFT.rho * A, SOFT.rho * inertia)
 
@@ -130,12 +131,15 @@ STEEL = fm.Material("steel", E=2.0e11, nu=0.3, rho=7870.0)
 def test_rod_of_a_slider_crank_bends_as_the_exact_beam_does():
     """A 6 mm steel rod in a crank drive with soft start; a slider of half its mass; bending of 2e-3 of its length."""
     drive, t_end, h = cycloidal_spin_up(SPEED, SOFT_START), 0.2, 2e-4
-    mesh = fm.straight_line((0, 0, 0), (ROD, 0, 0), 16)
-    section = fm.Circle(DIAMETER / 2)
-    kept = [fm.line_interface(mesh, p, fm.NodeIndices((k,))) for p, k in (("start", 0), ("middle", 8), ("end", 16))]
+    mesh = fm.beams.straight_line((0, 0, 0), (ROD, 0, 0), 16)
+    section = fm.beams.Circle(DIAMETER / 2)
+    kept = [
+        fm.beams.line_interface(mesh, p, fm.beams.NodeIndices((k,)))
+        for p, k in (("start", 0), ("middle", 8), ("end", 16))
+    ]
     body = cms.couple(
         fm.beam_body(
-            mesh, fm.BeamProperty(section, STEEL), name="rod", units=cms.unit_system("m-kg-s"), interfaces=kept
+            mesh, fm.beams.BeamProperty(section, STEEL), name="rod", units=cms.unit_system("m-kg-s"), interfaces=kept
         )
     )
     frame = cms.NodalFrame(dofs=((0, 0), (0, 1), (0, 2), (0, 3), (16, 1), (16, 2)))

@@ -21,21 +21,19 @@ from floatframe import (
     GeneralizedAlpha,
     Gravity,
     Marker,
-    PlaceSensor,
     PointForce,
     System,
-    consistent_state,
     integrate,
     linearize,
-    measured,
     read_results,
-    resume,
-    snapshot,
     static_equilibrium,
     system_modes,
 )
+from floatframe.analyses import consistent_state, snapshot
 from floatframe.results.recovery import interface_positions
 from floatframe.results.trajectory import BodyMotion
+from floatframe.sensors import PlaceSensor, measured
+from floatframe.simulation import resume
 from tests.floatframe.orders import slope
 
 LENGTH, N = 2.0, 8
@@ -45,13 +43,13 @@ T_END, H = 0.4, 1e-3
 @cache
 def reduced(frame):
     """Return a slender beam with damping ratios of the modes of its frame: "root" or "mean"."""
-    mesh = fm.straight_line((0, 0, 0), (LENGTH, 0, 0), N)
-    ends = [fm.line_interface(mesh, name, fm.NodeIndices((k,))) for name, k in (("root", 0), ("tip", N))]
+    mesh = fm.beams.straight_line((0, 0, 0), (LENGTH, 0, 0), N)
+    ends = [fm.beams.line_interface(mesh, name, fm.beams.NodeIndices((k,))) for name, k in (("root", 0), ("tip", N))]
     alloy = fm.Material("alloy", E=7e10, nu=0.3, rho=2700.0)
-    section = fm.BeamProperty(fm.Rectangle(0.03, 0.02), alloy, orientation=(0, 1, 0))
+    section = fm.beams.BeamProperty(fm.beams.Rectangle(0.03, 0.02), alloy, orientation=(0, 1, 0))
     body = cms.couple(fm.beam_body(mesh, section, name="beam", units=cms.unit_system("m-kg-s"), interfaces=ends))
     at = cms.NodalFrame("root") if frame == "root" else cms.TisserandFrame()
-    damping = cms.ModalDamping(0.03)
+    damping = cms.reduction.ModalDamping(0.03)
     return cms.reduce(body, cms.craig_bampton(body, n_modes=2), frame=at, geometric=True, damping=damping)
 
 

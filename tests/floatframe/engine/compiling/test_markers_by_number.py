@@ -9,7 +9,9 @@ from numpy.testing import assert_array_equal
 import cms
 import fe_models as fm
 from cms.body.modal_file.file import write
-from floatframe import GROUND, FlexibleBody, Marker, ModelError, PointForce, RevoluteJoint, System, consistent_state
+from floatframe import GROUND, FlexibleBody, Marker, PointForce, RevoluteJoint, System
+from floatframe.analyses import consistent_state
+from floatframe.errors import ModelError
 from floatframe.files.system_file.read_system import read_system
 from tests.bodies import STEEL
 
@@ -37,10 +39,14 @@ force = [0, 0, 5]
 @pytest.fixture(scope="module")
 def reduced():
     """A rod of three lines between the nodes 1000, 1010, 1020, 1030; interfaces at its ends."""
-    mesh = replace(fm.straight_line((0, 0, 0), (1, 0, 0), 3), node_numbers=1000 + 10 * np.arange(4))
-    ends = [fm.line_interface(mesh, name, fm.NodeIndices((k,))) for name, k in (("root", 0), ("tip", 3))]
+    mesh = replace(fm.beams.straight_line((0, 0, 0), (1, 0, 0), 3), node_numbers=1000 + 10 * np.arange(4))
+    ends = [fm.beams.line_interface(mesh, name, fm.beams.NodeIndices((k,))) for name, k in (("root", 0), ("tip", 3))]
     body = fm.beam_body(
-        mesh, fm.BeamProperty(fm.Circle(0.02), STEEL), name="rod", units=cms.unit_system("m-kg-s"), interfaces=ends
+        mesh,
+        fm.beams.BeamProperty(fm.beams.Circle(0.02), STEEL),
+        name="rod",
+        units=cms.unit_system("m-kg-s"),
+        interfaces=ends,
     )
     body = cms.couple(body)
     return cms.reduce(body, cms.craig_bampton(body, n_modes=3))

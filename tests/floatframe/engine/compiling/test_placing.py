@@ -12,26 +12,24 @@ import cms
 import fe_models as fm
 from floatframe import (
     GROUND,
-    CylindricalJoint,
     FixedJoint,
     FlexibleBody,
+    GeneralizedAlpha,
     Marker,
-    ModelError,
-    PointOnPlane,
     PrismaticJoint,
     RevoluteJoint,
     RigidBody,
-    ScrewJoint,
     SphericalJoint,
     SpringDamper,
     System,
-    consistent_state,
     integrate,
     read_system,
 )
+from floatframe.analyses import consistent_state
 from floatframe.analyses.system_check import check_system
 from floatframe.engine.compiling.placing import placed_bodies
-from floatframe.integrators import GeneralizedAlpha
+from floatframe.errors import ModelError
+from floatframe.joints import CylindricalJoint, PointOnPlane, ScrewJoint
 from floatframe.model.forces import Gravity
 from floatframe.model.functions.time_functions import harmonic
 from tests.floatframe.examples import CRANK
@@ -179,12 +177,16 @@ def test_a_fixed_rotation_turns_the_body(is_b):
 @pytest.mark.parametrize("frame", [cms.NodalFrame("start"), cms.TisserandFrame()])
 def test_a_flexible_body_is_placed_by_its_interface_in_any_frame(frame):
     """Deformed and turned at the start, drawn away from the origin, and stiffened, so that it moves in mean axes."""
-    line = fm.straight_line((0.3, -0.2, 0.5), (0.9, 0.1, 0.2), 3)
-    ends = [fm.line_interface(line, name, fm.NodeSet(name)) for name in ("start", "end")]
+    line = fm.beams.straight_line((0.3, -0.2, 0.5), (0.9, 0.1, 0.2), 3)
+    ends = [fm.beams.line_interface(line, name, fm.selections.NodeSet(name)) for name in ("start", "end")]
     steel = fm.Material("steel", E=2.1e11, nu=0.3, rho=7850.0)
     full = cms.couple(
         fm.beam_body(
-            line, fm.BeamProperty(fm.Rectangle(0.02, 0.03), steel), name="arm", units="m-kg-s", interfaces=ends
+            line,
+            fm.beams.BeamProperty(fm.beams.Rectangle(0.02, 0.03), steel),
+            name="arm",
+            units="m-kg-s",
+            interfaces=ends,
         )
     )
     reduced = cms.reduce(full, cms.craig_bampton(full, 2), frame=frame)

@@ -7,8 +7,8 @@ from scipy.optimize import brentq
 
 import cms
 import fe_models as fm
-from floatframe import FixedJoint, FlexibleBody, GeneralizedAlpha, Marker, System, integrate
-from floatframe.analyses import linearize, steady_rotation, system_modes
+from floatframe import FixedJoint, FlexibleBody, GeneralizedAlpha, Marker, System, integrate, linearize, system_modes
+from floatframe.analyses import steady_rotation
 from floatframe.analyses.equilibrium import Equilibrium, turning
 from floatframe.components.mechanisms import rotating_blade, spin_up_beam, spinning_shaft
 from floatframe.engine.compiling.system import compiled_system
@@ -35,9 +35,11 @@ WU_HAUG = {
 
 
 def coupled_beam(length, section, material, n, ends=("root", "tip")):
-    mesh = fm.straight_line((0, 0, 0), (length, 0, 0), n)
-    places = [fm.line_interface(mesh, name, fm.NodeIndices((k,))) for name, k in zip(ends, (0, n), strict=True)]
-    of_line = fm.BeamProperty(section, material, orientation=(0, 1, 0))
+    mesh = fm.beams.straight_line((0, 0, 0), (length, 0, 0), n)
+    places = [
+        fm.beams.line_interface(mesh, name, fm.beams.NodeIndices((k,))) for name, k in zip(ends, (0, n), strict=True)
+    ]
+    of_line = fm.beams.BeamProperty(section, material, orientation=(0, 1, 0))
     return cms.couple(fm.beam_body(mesh, of_line, name="beam", units=SI, interfaces=places))
 
 
@@ -54,7 +56,7 @@ def planar_beam(data, frame, n_modes=6):
     E = data["EI"] / inertia
     material = fm.Material("beam", E=E, nu=0.3, rho=data["rho_A"])
     assert_allclose(E, data["EA"], rtol=1e-6)
-    section = fm.GeneralSection(A=1.0, Iy=inertia, Iz=inertia, J=2 * inertia, A_sy=data["GA"] / (E / 2.6))
+    section = fm.beams.GeneralSection(A=1.0, Iy=inertia, Iz=inertia, J=2 * inertia, A_sy=data["GA"] / (E / 2.6))
     return reduced(fm.planar(coupled_beam(data["L"], section, material, 16)), n_modes, frame)
 
 
@@ -134,7 +136,7 @@ def test_spin_up_with_pitch_is_that_of_the_beam_in_parts():
     data, pitch = SIMO_VU_QUOC, smooth_step(1.0, 4.0, 0.0, 0.6)
     inertia = data["rho_I"] / data["rho_A"]
     material = fm.Material("beam", E=data["EI"] / inertia, nu=0.3, rho=data["rho_A"])
-    section = fm.GeneralSection(A=1.0, Iy=2 * inertia, Iz=inertia, J=2 * inertia)
+    section = fm.beams.GeneralSection(A=1.0, Iy=2 * inertia, Iz=inertia, J=2 * inertia)
     n = 6
     part = reduced(coupled_beam(data["L"] / n, section, material, 4), 4, cms.TisserandFrame())
     whole = reduced(coupled_beam(data["L"], section, material, 16), 12, cms.TisserandFrame())
@@ -191,7 +193,7 @@ ALLOY = fm.Material("alloy", E=7e10, nu=0.3, rho=2700.0)
 AREA = 1e-4
 INERTIA = AREA * (THIN * LENGTH) ** 2
 UNIT = np.sqrt(ALLOY.E * INERTIA / (ALLOY.rho * AREA * LENGTH**4))
-THIN_SECTION = fm.GeneralSection(A=AREA, Iy=INERTIA, Iz=INERTIA, J=2 * INERTIA)
+THIN_SECTION = fm.beams.GeneralSection(A=AREA, Iy=INERTIA, Iz=INERTIA, J=2 * INERTIA)
 
 
 @pytest.fixture(scope="module")
@@ -260,13 +262,13 @@ def test_spinning_free_beam_has_the_frequencies_of_theory():
 
 STEEL = fm.Material("steel", E=2.1e11, nu=0.3, rho=7850.0)
 RADIUS, SHAFT = 0.05, 1.0
-ROUND = fm.Circle(RADIUS).properties(STEEL.nu)
+ROUND = fm.beams.Circle(RADIUS).properties(STEEL.nu)
 
 
 @pytest.mark.parametrize("frame", [cms.NodalFrame("left"), cms.TisserandFrame()], ids=["tangent", "mean axis"])
 def test_pinned_shaft_whirls_as_rayleighs(frame):
     """In axes that turn with the shaft: forward whirl minus the speed, backward plus it."""
-    section = fm.GeneralSection(A=ROUND.A, Iy=ROUND.Iy, Iz=ROUND.Iz, J=ROUND.J)
+    section = fm.beams.GeneralSection(A=ROUND.A, Iy=ROUND.Iy, Iz=ROUND.Iz, J=ROUND.J)
     shaft = reduced(coupled_beam(SHAFT, section, STEEL, 24, ("left", "right")), 12, frame)
     of_shaft = {"E": STEEL.E, "rho": STEEL.rho, "A": ROUND.A, "inertia": ROUND.Iy, "length": SHAFT}
     critical = whirl_frequencies(1, **of_shaft, speed=0.0)[0]
@@ -291,7 +293,7 @@ def test_shaft_of_solids_whirls_as_one_of_beams():
     steel, side = fm.Material("steel", E=2.1e11, nu=0.0, rho=7850.0), 0.08
     bodies = {
         "solids": cms.couple(bar(16, 2, 2, width=side, height=side, material=steel)),
-        "beams": coupled_beam(1.0, fm.Rectangle(side, side), steel, 24, ("left", "right")),
+        "beams": coupled_beam(1.0, fm.beams.Rectangle(side, side), steel, 24, ("left", "right")),
     }
     found = {}
     for name, body in bodies.items():

@@ -4,17 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import (
-    GROUND,
-    CylindricalJoint,
-    DistanceJoint,
-    Marker,
-    RevoluteJoint,
-    RigidBody,
-    System,
-    UniversalJoint,
-    consistent_state,
-)
+from floatframe import GROUND, Marker, RevoluteJoint, RigidBody, System
+from floatframe.analyses import consistent_state
+from floatframe.joints import CylindricalJoint, DistanceJoint, UniversalJoint
 from floatframe.model.rotations import rotation_matrix
 
 LINK = np.diag([0.1, 0.2, 0.3])

@@ -3,17 +3,9 @@
 import numpy as np
 import pytest
 
-from floatframe import (
-    GROUND,
-    FixedJoint,
-    Marker,
-    ModelError,
-    PrismaticJoint,
-    RevoluteJoint,
-    RigidBody,
-    System,
-    consistent_state,
-)
+from floatframe import GROUND, FixedJoint, Marker, PrismaticJoint, RevoluteJoint, RigidBody, System
+from floatframe.analyses import consistent_state
+from floatframe.errors import ModelError
 from floatframe.model.rotations import euler_parameters_of_rotation_vector
 
 

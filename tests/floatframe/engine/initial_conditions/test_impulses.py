@@ -5,10 +5,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 from benchmarks.field_beams import parts, segments
-from floatframe import GROUND, ConvergenceError, GeneralizedAlpha, Marker, PrismaticJoint, RigidBody, System, integrate
+from floatframe import GROUND, GeneralizedAlpha, Marker, PrismaticJoint, RigidBody, System, integrate
 from floatframe.components.mechanisms import misaligned_four_bar
 from floatframe.engine.initial_conditions.impulses import words_of_begun_drives
 from floatframe.engine.initial_conditions.initial import consistent_state
+from floatframe.errors import ConvergenceError
 from floatframe.model.functions.time_functions import cycloidal_spin_up, polynomial_of_time
 
 H, AT_ONCE = 4e-3, polynomial_of_time([0.0, -0.6])

@@ -11,20 +11,19 @@ from floatframe import (
     GeneralizedAlpha,
     Gravity,
     Marker,
-    ModelError,
     RevoluteJoint,
     RigidBody,
     SphericalJoint,
     System,
-    consistent_state,
     integrate,
-    mobility,
 )
+from floatframe.analyses import consistent_state, mobility
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.initial import solve_accelerations
 from floatframe.engine.initial_conditions.newton_equations import displaced, set_iterate
 from floatframe.engine.kernels.entry import evaluate_and_linearize, rates_of_constraints
 from floatframe.engine.kernels.work import new_work
+from floatframe.errors import ModelError
 from floatframe.model.rotations import euler_parameters_of_rotation_vector
 from floatframe.model.state import State
 from tests.floatframe.engine.kernels.examples import system_with_everything

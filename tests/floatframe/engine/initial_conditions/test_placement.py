@@ -8,20 +8,19 @@ import pytest
 from floatframe import (
     GROUND,
     FlexibleBody,
+    GeneralizedAlpha,
     Marker,
-    ModelError,
-    PlaceSensor,
     RevoluteJoint,
     RigidBody,
     System,
-    consistent_state,
     integrate,
-    measured,
     static_equilibrium,
 )
-from floatframe.integrators import GeneralizedAlpha
+from floatframe.analyses import consistent_state
+from floatframe.errors import ModelError
 from floatframe.model.forces import Gravity
 from floatframe.model.functions.time_functions import constant
+from floatframe.sensors import PlaceSensor, measured
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 
 LINK = np.diag([0.01, 0.1, 0.1])

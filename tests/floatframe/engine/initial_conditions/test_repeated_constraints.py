@@ -8,21 +8,16 @@ from numpy.testing import assert_allclose
 
 from floatframe import (
     GROUND,
-    CylindricalJoint,
-    DistanceJoint,
     GeneralizedAlpha,
     Gravity,
     Marker,
-    ModelError,
     RevoluteJoint,
     RigidBody,
     SphericalJoint,
     System,
-    consistent_state,
     integrate,
-    mobility,
-    relative_model,
 )
+from floatframe.analyses import consistent_state, mobility, relative_model
 from floatframe.components.mechanisms import chain, four_bar
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions import initial
@@ -30,6 +25,8 @@ from floatframe.engine.initial_conditions.freedoms import scaled_constraints
 from floatframe.engine.initial_conditions.initial import dependent_count, repeated_constraints
 from floatframe.engine.kernels.work import new_work
 from floatframe.engine.tree.topology import tree_of
+from floatframe.errors import ModelError
+from floatframe.joints import CylindricalJoint, DistanceJoint
 from floatframe.model.rotations import euler_parameters_of_rotation_vector
 
 WEIGHT = Gravity((0.0, -9.81, 0.0))

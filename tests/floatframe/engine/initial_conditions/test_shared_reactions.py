@@ -6,7 +6,6 @@ from numpy.testing import assert_allclose
 
 from floatframe import (
     GROUND,
-    EnergyMomentum,
     GeneralizedAlpha,
     Gravity,
     JointForce,
@@ -16,6 +15,7 @@ from floatframe import (
     System,
     integrate,
 )
+from floatframe.integrators import EnergyMomentum
 from floatframe.model.rotations import rotation_matrix, tilde
 
 TURN = rotation_matrix(np.array([0.8, 0.3, -0.4, np.sqrt(1 - 0.89)]))  #: of the whole system

@@ -77,5 +77,5 @@ def test_arrays_survive_a_file(tmp_path):
 
 
 def test_stiffening_that_is_not_there_is_refused():
-    with pytest.raises(ff.ModelError, match="holds no geometric stiffness"):
+    with pytest.raises(ff.errors.ModelError, match="holds no geometric stiffness"):
         body_equations(bodies()["linear"].reduced, stiffening=True)

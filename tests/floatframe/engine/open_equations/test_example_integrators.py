@@ -135,7 +135,7 @@ def test_rattle_refuses_a_turning_body():
     body = ff.RigidBody("top", 2.0, np.diag([1.0, 2.0, 2.5]), omega_B=(0.3, 2.0, 0.1))
     eq = open_equations(ff.System([body], forces=[ff.Gravity((0, 0, -1.0))]))
     x, v, _, _ = eq.start()
-    with pytest.raises(ff.ModelError, match="forces that do not depend on velocities"):
+    with pytest.raises(ff.errors.ModelError, match="forces that do not depend on velocities"):
         rattle(eq, x, v, np.linspace(0, 0.1, 3))
 
 
@@ -144,7 +144,7 @@ def test_velocity_constraints_of_rolling_are_integrated():
     disc = ff.RigidBody(
         "disc", 1.0, np.diag([0.05, 0.1, 0.05]), position=(0, 0, 0.4), velocity=(0.8, 0, 0), omega_B=(0, 2.0, 0)
     )
-    rolls = ff.RollingDisc("rolls", ff.Marker(ff.GROUND), ff.Marker("disc"), radius=0.4)
+    rolls = ff.joints.RollingDisc("rolls", ff.Marker(ff.GROUND), ff.Marker("disc"), radius=0.4)
     eq = open_equations(ff.System([disc], [rolls], [ff.Gravity((0, 0, -9.81))]))
     assert list(eq.is_holonomic) == [True, False, False]
     x, v, _, _ = eq.start()

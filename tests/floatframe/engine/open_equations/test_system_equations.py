@@ -27,14 +27,14 @@ def geared():
         ff.RevoluteJoint("shaft", ff.GROUND, ff.Marker("large")),
         ff.PrismaticJoint("guide", ff.GROUND, ff.Marker("block"), axis=(1.0, 0.0, 0.0)),
     ]
-    wheels = [(ff.JointCoordinate("axle", "angle"), 20.0), (ff.JointCoordinate("shaft", "angle"), 31.0)]
+    wheels = [(ff.joints.JointCoordinate("axle", "angle"), 20.0), (ff.joints.JointCoordinate("shaft", "angle"), 31.0)]
     forces = [
         ff.JointForce("twist", "axle", "angle", stiffness=3.0, damping=0.2, preload=0.4),
         ff.JointForce("push", "guide", "distance", stiffness=30.0, damping=0.7, free=0.1),
         ff.SpringDamper("link", ff.Marker("block"), ff.Marker("large", position=(0.3, 0, 0)), 40.0, 2.0, 0.3),
         ff.Gravity((0.0, -9.81, 0.0)),
     ]
-    return ff.System(bodies, joints, forces, couplers=[ff.CoordinateCoupler("gear", wheels)])
+    return ff.System(bodies, joints, forces, couplers=[ff.joints.CoordinateCoupler("gear", wheels)])
 
 
 SYSTEMS = {
@@ -144,7 +144,7 @@ def test_the_start_is_that_of_the_integrator(name):
     system = SYSTEMS[name]()
     eq = open_equations(system)
     x, v, a, lam = eq.start(t=0.05)
-    made = ff.consistent_state(system, t=0.05)
+    made = ff.analyses.consistent_state(system, t=0.05)
     assert_allclose(a, made.u_dot, rtol=0, atol=1e-10 * max(np.abs(a).max(), 1.0))
     own = eq.wrenches(0.05, x, v, lam)
     rows = eq.rows_at(0.05, x, v)
@@ -217,19 +217,23 @@ def test_projection_closes_constraints():
 def test_bad_input_is_told():
     eq = open_equations(slider_crank())
     x, v, a, lam = eq.start()
-    with pytest.raises(ff.ModelError, match="x: expected 21 finite numbers"):
+    with pytest.raises(ff.errors.ModelError, match="x: expected 21 finite numbers"):
         eq.residual(0.0, x[:-1], v, a, lam)
-    with pytest.raises(ff.ModelError, match="not finite"):
+    with pytest.raises(ff.errors.ModelError, match="not finite"):
         eq.force(0.0, x, np.full(18, np.nan))
-    with pytest.raises(ff.ModelError, match=r"rod omega z"):
+    with pytest.raises(ff.errors.ModelError, match=r"rod omega z"):
         eq.layout.index("v", "rod", "omega zz")
     body = ff.RigidBody("cart", 1.0, np.eye(3))
     guide = ff.PrismaticJoint("guide", ff.GROUND, ff.Marker("cart"), axis=(1, 0, 0))
     rubbing = ff.JointForce("rub", "guide", "distance", friction_coefficient=0.3)
-    with pytest.raises(ff.ModelError, match="friction by the force"):
+    with pytest.raises(ff.errors.ModelError, match="friction by the force"):
         open_equations(ff.System([body], [guide], [rubbing]))
     control = ff.UserForce(
-        "pid", {"s": ff.JointCoordinate("guide", "distance")}, forces={"s": "-e"}, rates={"e": "s"}, states={"e": 0.0}
+        "pid",
+        {"s": ff.joints.JointCoordinate("guide", "distance")},
+        forces={"s": "-e"},
+        rates={"e": "s"},
+        states={"e": 0.0},
     )
-    with pytest.raises(ff.ModelError, match="'pid' has states of its own"):
+    with pytest.raises(ff.errors.ModelError, match="'pid' has states of its own"):
         open_equations(ff.System([body], [guide], [control]))

@@ -5,7 +5,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from floatframe import FloatframeError, GeneralizedAlpha, integrate
+from floatframe import GeneralizedAlpha, integrate
+from floatframe.errors import FloatframeError
 from tests.floatframe.engine.structure_preserving.element_parts import ELEMENT_PARTS
 from tests.floatframe.engine.structure_preserving.part_table import REFUSED
 from tests.floatframe.engine.structure_preserving.parts import METHODS, PARTS

@@ -2,11 +2,13 @@
 
 import numpy as np
 
-from floatframe import GROUND, ConstantOrientation, Gravity, Marker, RelativeOde, RevoluteJoint, RigidBody, System
+from floatframe import GROUND, Gravity, Marker, RevoluteJoint, RigidBody, System
 from floatframe.components import rails, wheels
 from floatframe.components.bearings import Bearing
 from floatframe.components.clearances import Backlash, BallWithPlay
 from floatframe.components.drives import Pid, PidDrive
+from floatframe.integrators import RelativeOde
+from floatframe.joints import ConstantOrientation
 from floatframe.model.functions.time_functions import harmonic
 from tests.floatframe.components.aerodynamics.examples import glider
 from tests.floatframe.components.cables.examples import jumper

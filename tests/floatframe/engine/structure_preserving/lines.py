@@ -3,7 +3,9 @@
 import numpy as np
 
 import cms
-from floatframe import FlexibleBody, Marker, RigidBody, SlidingJoint, SpringDamper, System
+import fe_models
+from floatframe import FlexibleBody, Marker, RigidBody, SpringDamper, System
+from floatframe.joints import SlidingJoint
 from floatframe.model.functions.time_functions import polynomial_of_time
 
 __all__ = ["SLIDING", "sliding"]
@@ -13,8 +15,8 @@ STATIONS = {f"s{k}": 0.25 * k for k in range(5)}
 
 def soft_beam(*, geometric: bool = False):
     """Return a beam of 1 m whose first mode has a period of 0.2 s."""
-    line = cms.BeamLine(1.0, 1.0, 1e4, 2.0, 2.0, 0.05, rho_Iy=5e-3, rho_Iz=5e-3)
-    return cms.beam_from_assumed_modes(
+    line = fe_models.beams.BeamLine(1.0, 1.0, 1e4, 2.0, 2.0, 0.05, rho_Iy=5e-3, rho_Iz=5e-3)
+    return cms.reduction.beam_from_assumed_modes(
         line, name="beam", units=cms.unit_system("m-kg-s"), stations=STATIONS, n_axial=0, n_bending=2, n_torsion=1,
         geometric=geometric,
     )  # fmt: skip

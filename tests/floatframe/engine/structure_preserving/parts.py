@@ -13,26 +13,27 @@ import numpy as np
 from fe_models.body.load_cases import ReducedLoadCase
 from floatframe import (
     GROUND,
-    BodyLoad,
-    CoordinateCoupler,
-    EnergyDecaying,
-    EnergyMomentum,
     FlexibleBody,
     GeneralizedAlpha,
     Gravity,
-    Ida,
-    JointCoordinate,
     JointForce,
     Marker,
     PointForce,
-    RelativeGeneralizedAlpha,
-    RelativeOde,
     RigidBody,
     SpringDamper,
     System,
-    Variational,
 )
 from floatframe.components.mechanisms import four_bar
+from floatframe.forces import BodyLoad
+from floatframe.integrators import (
+    EnergyDecaying,
+    EnergyMomentum,
+    Ida,
+    RelativeGeneralizedAlpha,
+    RelativeOde,
+    Variational,
+)
+from floatframe.joints import CoordinateCoupler, JointCoordinate
 from floatframe.model.functions.time_functions import cycloidal_spin_up, harmonic
 from floatframe.model.functions.time_functions import table as table_function
 from tests.floatframe.engine.structure_preserving import systems

@@ -4,22 +4,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from floatframe import (
+from floatframe import JointForce, Marker, RevoluteJoint, RigidBody, SpringDamper, System, UserForce
+from floatframe.forces import Bushing, SphereContact
+from floatframe.joints import (
     AxialDistance,
-    Bushing,
     ConstantVelocityJoint,
     CoordinateCoupler,
     JointCoordinate,
-    JointForce,
-    Marker,
     PointDistance,
-    RevoluteJoint,
-    RigidBody,
     RollingDisc,
-    SphereContact,
-    SpringDamper,
-    System,
-    UserForce,
 )
 from floatframe.model.functions.time_functions import cycloidal_spin_up, harmonic
 from floatframe.model.functions.time_functions import table as table_function

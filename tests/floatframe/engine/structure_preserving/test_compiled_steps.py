@@ -9,22 +9,15 @@ from numpy.testing import assert_allclose, assert_array_equal
 from fe_models.body.load_cases import ReducedLoadCase
 from floatframe import (
     GROUND,
-    AxialDistance,
-    BodyLoad,
-    ConvergenceError,
-    EnergyDecaying,
-    EnergyMomentum,
     Gravity,
     JointForce,
     Marker,
     PointForce,
-    PointOnPlane,
     RigidBody,
     SphericalJoint,
     SpringDamper,
     System,
     UserForce,
-    Variational,
     integrate,
 )
 from floatframe.engine.compiling.system import compile_system, compiled_system
@@ -32,6 +25,10 @@ from floatframe.engine.kernels.connections.contact import V_0
 from floatframe.engine.kernels.model import CONTACT
 from floatframe.engine.kernels.work import new_work
 from floatframe.engine.structure_preserving.system import discrete_system
+from floatframe.errors import ConvergenceError
+from floatframe.forces import BodyLoad
+from floatframe.integrators import EnergyDecaying, EnergyMomentum, Variational
+from floatframe.joints import AxialDistance, PointOnPlane
 from floatframe.model.functions.time_functions import cycloidal_spin_up, harmonic
 from floatframe.model.functions.time_functions import table as table_function
 from floatframe.model.joints.rows import POINT

@@ -8,19 +8,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import (
-    CoordinateCoupler,
-    EnergyDecaying,
-    EnergyMomentum,
-    Event,
-    GeneralizedAlpha,
-    JointCoordinate,
-    ModelError,
-    System,
-    Variational,
-    integrate,
-    joint_coordinate,
-)
+from floatframe import GeneralizedAlpha, System, integrate
+from floatframe.errors import ModelError
+from floatframe.integrators import EnergyDecaying, EnergyMomentum, Variational
+from floatframe.joints import CoordinateCoupler, JointCoordinate
+from floatframe.results import joint_coordinate
+from floatframe.simulation import Event
 from tests.floatframe.engine.structure_preserving.systems import (
     CONNECTED,
     CONTACTS,

@@ -5,7 +5,7 @@ Each cell of the table in docs/integrators.md is a test, here and in the files b
 
 import pytest
 
-from floatframe.integrators import CLASSES
+from floatframe.integrators.registry import CLASSES
 from floatframe.model.joints import JOINTS
 from tests.floatframe.engine.structure_preserving.compared import ALL, BY_IDA, assert_runs_or_is_refused, cells
 from tests.floatframe.engine.structure_preserving.part_table import PAGE, REFUSED, table

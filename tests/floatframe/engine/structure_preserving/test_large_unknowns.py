@@ -11,15 +11,8 @@ import pytest
 from numba import njit
 from numpy.testing import assert_allclose
 
-from floatframe import (
-    EnergyDecaying,
-    EnergyMomentum,
-    GeneralizedAlpha,
-    Marker,
-    System,
-    Variational,
-    integrate,
-)
+from floatframe import GeneralizedAlpha, Marker, System, integrate
+from floatframe.integrators import EnergyDecaying, EnergyMomentum, Variational
 from floatframe.model.elements import Element, ElementLaw
 from tests.floatframe.engine.structure_preserving.examples import CASES, A, B, pair, tied
 

@@ -8,16 +8,9 @@ import pytest
 from numba import njit
 from numpy.testing import assert_allclose
 
-from floatframe import (
-    GROUND,
-    JointCoordinate,
-    Marker,
-    PrismaticJoint,
-    RigidBody,
-    System,
-    UserForce,
-)
+from floatframe import GROUND, Marker, PrismaticJoint, RigidBody, System, UserForce
 from floatframe.engine.compiling.system import compiled_system
+from floatframe.joints import JointCoordinate
 from floatframe.model.elements import Element, ElementLaw
 from tests.floatframe.engine.structure_preserving.in_python.forces import user_values
 from tests.floatframe.engine.structure_preserving.in_python.public_elements import Motion

@@ -12,7 +12,7 @@ from floatframe import JointForce, Marker, RevoluteJoint, RigidBody, System, Use
 from floatframe.model.functions.time_functions import constant
 from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_exp
 
-SCHEMES = [ff.EnergyMomentum(), ff.EnergyDecaying(), ff.Variational()]
+SCHEMES = [ff.integrators.EnergyMomentum(), ff.integrators.EnergyDecaying(), ff.integrators.Variational()]
 NAMES = [type(scheme).__name__ for scheme in SCHEMES]
 TILT = np.array([0.5, -0.8, 1.1])
 AXIS = rotation_exp(TILT)[:, 2]
@@ -61,7 +61,7 @@ def test_a_damper_slows_a_wheel_by_its_exponential(scheme, turn, kind):
     h, c = 0.01, 0.01
     force = JointForce("d", "hinge", "angle", damping=c)
     if kind == "user force":
-        angle = ff.JointCoordinate("hinge", "angle")
+        angle = ff.joints.JointCoordinate("hinge", "angle")
         force = UserForce("d", {"phi": angle}, forces={"phi": "-c*phi_dot"}, parameters={"c": c})
     after = speed_at_end(wheel(turn / h, force), scheme, 0.5, h)
     assert_allclose(after, turn / h * np.exp(-0.5), rtol=1e-5)

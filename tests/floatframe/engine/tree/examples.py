@@ -5,20 +5,16 @@ import pytest
 
 from floatframe import (
     GROUND,
-    ConstantOrientation,
-    CylindricalJoint,
     FixedJoint,
     JointForce,
     Marker,
-    PlanarJoint,
     PrismaticJoint,
     RevoluteJoint,
     RigidBody,
-    ScrewJoint,
     SphericalJoint,
     System,
-    UniversalJoint,
 )
+from floatframe.joints import ConstantOrientation, CylindricalJoint, PlanarJoint, ScrewJoint, UniversalJoint
 from floatframe.model.functions.time_functions import harmonic
 from tests.floatframe.engine.tree.mechanisms import DOWN
 

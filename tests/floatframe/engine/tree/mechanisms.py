@@ -30,9 +30,9 @@ ALONG = ("start", "a", "b", "c", "end")
 def beam(length=1.0, n_modes=2):
     """A slender beam with five interfaces and geometric stiffness."""
     n = 8
-    mesh = fm.straight_line((0, 0, 0), (length, 0, 0), n)
-    ends = [fm.line_interface(mesh, name, fm.NodeIndices((2 * k,))) for k, name in enumerate(ALONG)]
-    section = fm.BeamProperty(fm.Rectangle(0.03, 0.02), SOFT, orientation=(0, 1, 0))
+    mesh = fm.beams.straight_line((0, 0, 0), (length, 0, 0), n)
+    ends = [fm.beams.line_interface(mesh, name, fm.beams.NodeIndices((2 * k,))) for k, name in enumerate(ALONG)]
+    section = fm.beams.BeamProperty(fm.beams.Rectangle(0.03, 0.02), SOFT, orientation=(0, 1, 0))
     body = cms.couple(fm.beam_body(mesh, section, name="beam", units=cms.unit_system("m-kg-s"), interfaces=ends))
 
     return cms.reduce(body, cms.craig_bampton(body, n_modes=n_modes), geometric=True)

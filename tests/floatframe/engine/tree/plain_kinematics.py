@@ -153,11 +153,11 @@ def flexible_tree(seed=0, *, is_free=False, is_stiffened=True, n=3):
     axis, other = np.array([0.6, 0.0, 0.8]), np.array([0.0, 1.0, 0.0])
     made = {
         "revolute": lambda *m: ff.RevoluteJoint(*m, axis=axis),
-        "universal": lambda *m: ff.UniversalJoint(*m, axis=axis, axis_b=other),
-        "planar": lambda *m: ff.PlanarJoint(*m, axis=axis),
+        "universal": lambda *m: ff.joints.UniversalJoint(*m, axis=axis, axis_b=other),
+        "planar": lambda *m: ff.joints.PlanarJoint(*m, axis=axis),
         "spherical": lambda *m: ff.SphericalJoint(*m),
-        "cylindrical": lambda *m: ff.CylindricalJoint(*m, axis=axis),
-        "screw": lambda *m: ff.ScrewJoint(*m, axis=axis, lead=0.7),
+        "cylindrical": lambda *m: ff.joints.CylindricalJoint(*m, axis=axis),
+        "screw": lambda *m: ff.joints.ScrewJoint(*m, axis=axis, lead=0.7),
         "prismatic": lambda *m: ff.PrismaticJoint(*m, axis=axis),
         "fixed": lambda *m: ff.FixedJoint(*m),
     }

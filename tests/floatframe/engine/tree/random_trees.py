@@ -95,13 +95,13 @@ def joint_of(link, name, a, b):
         case "prismatic":
             return ff.PrismaticJoint(name, a, b, axis=axis)
         case "cylindrical":
-            return ff.CylindricalJoint(name, a, b, axis=axis)
+            return ff.joints.CylindricalJoint(name, a, b, axis=axis)
         case "screw":
-            return ff.ScrewJoint(name, a, b, axis=axis, lead=LEAD)
+            return ff.joints.ScrewJoint(name, a, b, axis=axis, lead=LEAD)
         case "universal":
-            return ff.UniversalJoint(name, a, b, axis=axis, axis_b=link.axis_b)
+            return ff.joints.UniversalJoint(name, a, b, axis=axis, axis_b=link.axis_b)
         case "planar":
-            return ff.PlanarJoint(name, a, b, axis=axis)
+            return ff.joints.PlanarJoint(name, a, b, axis=axis)
         case "spherical":
             return ff.SphericalJoint(name, a, b)
         case _:

@@ -19,7 +19,7 @@ def both():
     names = [theirs.body(k).name for k in range(1, theirs.nbody)]
     order = [0] * 6 + [6 + names.index(link.name) - 1 for link in humanoid.LINKS[1:]]
     order[:6] = range(6)
-    return ff.relative_model(humanoid.system()), mujoco, theirs, mujoco.MjData(theirs), np.array(order)
+    return ff.analyses.relative_model(humanoid.system()), mujoco, theirs, mujoco.MjData(theirs), np.array(order)
 
 
 def random_motion(model, seed=0):

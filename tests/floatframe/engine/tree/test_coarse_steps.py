@@ -26,8 +26,8 @@ GRAVITY = Gravity((0.0, -9.81, 0.0))
 def flexible_top():
     """A rod in mean axes on a ball joint, whose fastest mode has 60 periods in a step of 10 ms."""
     line = BeamLine(1.0, 0.785, 2.1e7, 175.0, 175.0, 112.0, 6.3e-6, 6.3e-6)
-    reduced = cms.beam_from_assumed_modes(
-        line, name="rod", units=unit_system("m-kg-s"), n_axial=2, n_bending=4, damping=cms.ModalDamping(0.02)
+    reduced = cms.reduction.beam_from_assumed_modes(
+        line, name="rod", units=unit_system("m-kg-s"), n_axial=2, n_bending=4, damping=cms.reduction.ModalDamping(0.02)
     )
     ball = SphericalJoint("ball", Marker(GROUND, position=np.zeros(3)), Marker("rod", "start"))
     rod = FlexibleBody("rod", reduced, stiffening=False, omega_B=(1.0, 3.0, 4.0))

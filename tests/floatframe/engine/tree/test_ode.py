@@ -16,22 +16,21 @@ from floatframe import (
     GeneralizedAlpha,
     Gravity,
     Marker,
-    ModelError,
-    RelativeOde,
     RigidBody,
     System,
-    coupler_motion,
-    element_motion,
     integrate,
     linearize,
     read_results,
-    resume,
     static_equilibrium,
 )
 from floatframe.components.mechanisms import four_bar, pendulum, slider_crank, spinning_top
+from floatframe.errors import ModelError
+from floatframe.integrators import RelativeOde
 from floatframe.integrators.relative_ode import partition_of
 from floatframe.model.bodies.mode_choice import with_modes
 from floatframe.model.functions.time_functions import smooth_step
+from floatframe.results import coupler_motion, element_motion
+from floatframe.simulation import resume
 from tests.floatframe.engine.tree.examples import rubbed_block
 from tests.floatframe.engine.tree.mechanisms import DOWN, MECHANISMS, beam
 from tests.floatframe.model.elements.element_accelerations_examples import pair

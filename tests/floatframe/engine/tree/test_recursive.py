@@ -17,7 +17,7 @@ BESIDE = 1e-10  #: times the condition number of the mass matrix: asked of the c
 def beside_pinocchio(n, seed, kinds=KINDS[:-1], **options):
     rng = np.random.default_rng(seed)
     links = random_tree(n, rng, kinds=kinds, **options)
-    return ff.relative_model(system_of(links)), PinocchioTree(links), *random_state(links, rng), rng
+    return ff.analyses.relative_model(system_of(links)), PinocchioTree(links), *random_state(links, rng), rng
 
 
 TREES = {
@@ -86,7 +86,7 @@ class Flexible:
 
     def __init__(self, **options):
         self.system = flexible_tree(**options)
-        self.model = ff.relative_model(self.system)
+        self.model = ff.analyses.relative_model(self.system)
         self.plain, self.eq = PlainTree(self.system, self.model), open_equations(self.system)
         self.z, self.z_dot, self.z_ddot = random_motion(self.plain, 1)
         self.T = self.plain.jacobian(self.z)
@@ -149,7 +149,7 @@ def test_derivatives_of_flexible_trees_are_those_of_differences(flexible):
 def test_a_body_with_one_mode_on_a_joint_without_rates_is_no_hinge():
     """Rates of the joint and modes of a body are one number there, which is its mode."""
     system = flexible_tree(n=2)
-    model = ff.relative_model(system)
+    model = ff.analyses.relative_model(system)
     z, z_dot, z_ddot = random_motion(PlainTree(system, model), 1)
     M = model.mass_matrix(z)
     got = model.forward_dynamics(z, z_dot, model.inverse_dynamics(z, z_dot, z_ddot))
@@ -201,7 +201,7 @@ def pendulum():
 
 
 def test_a_pendulum_has_the_torque_and_the_reaction_of_the_textbook():
-    model = ff.relative_model(pendulum())
+    model = ff.analyses.relative_model(pendulum())
     z, w, alpha = 0.3, 1.2, -0.7
     J = 0.2 + 2.0 * 0.25
     torque = model.inverse_dynamics([z], [w], [alpha])
@@ -219,9 +219,9 @@ def test_a_block_that_slides_on_a_turning_carrier_has_the_force_of_coriolis(is_r
     carrier = ff.RigidBody("carrier", 3.0, np.diag([0.4, 0.5, 0.6]))
     block = ff.RigidBody("block", m, np.diag([0.1, 0.2, 0.25]), position=p)
     ends = ff.Marker("carrier", position=p), ff.Marker("block")
-    slide = ff.ConstantOrientation("slide", *(ends[::-1] if is_reversed else ends))
+    slide = ff.joints.ConstantOrientation("slide", *(ends[::-1] if is_reversed else ends))
     hinge = ff.RevoluteJoint("hinge", ff.GROUND, ff.Marker("carrier"), axis=axis)
-    model = ff.relative_model(ff.System([carrier, block], [hinge, slide]))
+    model = ff.analyses.relative_model(ff.System([carrier, block], [hinge, slide]))
     assert [name.partition("/")[0] for name in model.names] == ["hinge", "slide", "slide", "slide"]
     (angle, w, acceleration), sign = (0.4, 2.3, -1.1), -1 if is_reversed else 1
     r, v, a = np.array([0.2, 0.1, -0.3]), np.array([0.5, -0.8, 0.7]), np.array([1.5, 0.3, -0.4])
@@ -234,7 +234,7 @@ def test_a_block_that_slides_on_a_turning_carrier_has_the_force_of_coriolis(is_r
 def test_reactions_balance_the_wrenches_of_a_chain_at_rest():
     """Held still, the joint at the base carries the weight of all bodies and a load at the tip."""
     links = random_tree(5, np.random.default_rng(7), kinds=("revolute", "universal"), branching=0.0)
-    model = ff.relative_model(system_of(links, gravity=(0.0, 0.0, -10.0)))
+    model = ff.analyses.relative_model(system_of(links, gravity=(0.0, 0.0, -10.0)))
     z, zero = np.full(model.n_z, 0.4), np.zeros(model.n_rates)
     tip, load = ff.Marker("b4", position=(0.1, 0.2, 0.3)), np.array([1.0, 2.0, 3.0, 0.0, 0.0, 0.0])
     reaction = model.reactions(z, zero, zero, wrenches={tip: load})[0]
@@ -269,16 +269,16 @@ def sprung():
 )
 def test_systems_that_are_no_trees_under_gravity_are_refused(system, words):
     with pytest.raises(ModelError, match=words):
-        ff.relative_model(system)
+        ff.analyses.relative_model(system)
 
 
 def test_numbers_that_do_not_fit_are_refused():
-    model = ff.relative_model(pendulum())
+    model = ff.analyses.relative_model(pendulum())
     with pytest.raises(ModelError, match="z: expected 1 finite numbers, got shape"):
         model.mass_matrix([0.1, 0.2])
     with pytest.raises(ModelError, match="z_dot: expected 1 finite numbers, got numbers that are not finite"):
         model.inverse_dynamics([0.1], [np.nan], [0.0])
-    free = ff.relative_model(ff.System(pendulum().bodies))
+    free = ff.analyses.relative_model(ff.System(pendulum().bodies))
     with pytest.raises(ModelError, match="Euler parameters of length 1 at 3 to 6"):
         free.mass_matrix(np.zeros(7))
 
@@ -286,7 +286,7 @@ def test_numbers_that_do_not_fit_are_refused():
 def test_accelerations_under_a_drive_are_refused():
     rod = pendulum().bodies[0]
     hinge = ff.RevoluteJoint("hinge", ff.GROUND, ff.Marker("rod"), axis=(0, 1, 0), motions={"angle": 0.3})
-    model = ff.relative_model(ff.System([rod], [hinge]))
+    model = ff.analyses.relative_model(ff.System([rod], [hinge]))
     assert model.inverse_dynamics([0.0], [0.0], [1.0]).shape == (1,)
     with pytest.raises(ModelError, match="'hinge/angle' is prescribed"):
         model.forward_dynamics([0.0], [0.0])

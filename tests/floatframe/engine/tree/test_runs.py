@@ -6,25 +6,23 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from floatframe import (
     GROUND,
-    Bushing,
-    EnergyMomentum,
-    Event,
     GeneralizedAlpha,
     Marker,
-    ModelError,
     PrismaticJoint,
     RevoluteJoint,
     RigidBody,
     SphericalJoint,
     System,
-    SystemFileError,
     integrate,
-    resume,
 )
 from floatframe.components.mechanisms import chain, double_pendulum, four_bar, slider_crank
 from floatframe.engine.tree.topology import tree_of
+from floatframe.errors import ModelError, SystemFileError
 from floatframe.files.system_file.read_system import read_system
+from floatframe.forces import Bushing
+from floatframe.integrators import EnergyMomentum
 from floatframe.model.functions.time_functions import harmonic
+from floatframe.simulation import Event, resume
 from tests.floatframe.engine.tree.examples import rubbed_block
 from tests.floatframe.engine.tree.mechanisms import DOWN, beam, falling
 from tests.floatframe.simulation.examples import StopHereError

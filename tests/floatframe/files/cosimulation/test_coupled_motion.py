@@ -8,19 +8,12 @@ from numpy.testing import assert_allclose
 from scipy.linalg import expm
 from typer.testing import CliRunner
 
-from floatframe import (
-    CosimulationError,
-    Coupling,
-    FloatframeError,
-    ForeignUnit,
-    ModelError,
-    co_simulate,
-    integrate,
-    read_results,
-    read_system,
-)
+from floatframe import integrate, read_results, read_system
 from floatframe.cli.app import app
+from floatframe.errors import CosimulationError, FloatframeError, ModelError
+from floatframe.files import co_simulate
 from floatframe.files.cosimulation.archive import write_fmu
+from floatframe.simulation import Coupling, ForeignUnit
 from tests.floatframe.files.cosimulation.two_masses import T_END, X1, D, K, M, error, exact, write_two_masses
 
 SPAN = 0.2

@@ -15,10 +15,12 @@ from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
 from fe_models.foundation.units import unit_system
-from floatframe import ModelError, SystemFileError, integrate, measured, read_system
+from floatframe import integrate, read_system
 from floatframe.cli.app import app
+from floatframe.errors import ModelError, SystemFileError
 from floatframe.files.cosimulation.archive import write_fmu
 from floatframe.files.cosimulation.model_description import BaseUnit, base_unit
+from floatframe.sensors import measured
 from tests.floatframe.files.cosimulation.arms import JUMPS, MACRO, MOTORS, T_END, TOLERANCE, H, write_arm
 
 ROOT = Path(__file__).resolve().parents[4]

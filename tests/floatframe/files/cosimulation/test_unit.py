@@ -6,22 +6,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from floatframe import (
-    GROUND,
-    ConvergenceError,
-    GeneralizedAlpha,
-    Marker,
-    ModelError,
-    PrismaticJoint,
-    ResultsError,
-    RigidBody,
-    System,
-    integrate,
-    measured,
-    read_system,
-)
+from floatframe import GROUND, GeneralizedAlpha, Marker, PrismaticJoint, RigidBody, System, integrate, read_system
+from floatframe.errors import ConvergenceError, ModelError, ResultsError
 from floatframe.files.cosimulation.unit import Unit, UnitState, quintic
 from floatframe.model.functions.time_functions import constant, polynomial_of_time
+from floatframe.sensors import measured
 from tests.floatframe.files.cosimulation.arms import MACRO, T_END, H, motor_at, write_arm
 
 MOTOR = "forces.motor.motor"

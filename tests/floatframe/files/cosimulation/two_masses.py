@@ -12,7 +12,9 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import expm
 
-from floatframe import Coupling, co_simulate, read_system
+from floatframe import read_system
+from floatframe.files import co_simulate
+from floatframe.simulation import Coupling
 
 M, K, D, KC, DC, T_END = 1.0, 100.0, 0.4, 60.0, 0.6, 1.0
 X1 = 0.1  #: of mass 1 at the start

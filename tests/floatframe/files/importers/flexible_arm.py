@@ -1,6 +1,7 @@
 """An arm of two links along z, the first a beam: rigid in the description, or a reduced body."""
 
 import cms
+import fe_models
 from cms.reduction.basis.frames import NodalFrame
 
 LENGTH, RHO_A, EI, RHO_I = 0.8, 2.0, 400.0, 2e-4
@@ -8,11 +9,11 @@ MASS, TIP_MASS, GRAVITY = RHO_A * LENGTH, 0.5, 9.81
 
 
 def beam_body():
-    line = cms.BeamLine(
+    line = fe_models.beams.BeamLine(
         LENGTH, rho_A=RHO_A, EA=1e7, EIy=EI, EIz=EI, GJ=200.0, rho_Iy=RHO_I, rho_Iz=RHO_I
     )  # fmt: skip
     stations = {"root": 0.0, "tip": LENGTH}
-    return cms.beam_from_assumed_modes(
+    return cms.reduction.beam_from_assumed_modes(
         line, name="beam", units=cms.unit_system("m-kg-s"), n_axial=1, n_bending=3, n_torsion=1, stations=stations,
         frame=NodalFrame("root"), n_shear=0,
     )  # fmt: skip

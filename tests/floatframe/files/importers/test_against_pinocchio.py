@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import consistent_state
+from floatframe.analyses import consistent_state
 from floatframe.engine.open_equations import open_equations
 from floatframe.files.importers.read_urdf import read_urdf
 from floatframe.files.importers.robot_system import robot_system

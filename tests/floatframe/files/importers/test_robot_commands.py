@@ -9,8 +9,10 @@ from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
 from cms.body.modal_file.file import write
-from floatframe import UrdfError, consistent_state, read_results, read_system, static_equilibrium
+from floatframe import read_results, read_system, static_equilibrium
+from floatframe.analyses import consistent_state
 from floatframe.cli.app import app
+from floatframe.errors import UrdfError
 from floatframe.files.importers.read_urdf import read_urdf
 from floatframe.files.importers.robot_system import FlexibleLink, robot_system
 from floatframe.files.importers.system_robot import robot_of_system

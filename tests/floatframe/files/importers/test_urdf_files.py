@@ -4,13 +4,16 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from floatframe import CoordinateCoupler, Marker, RigidBody, SphericalJoint, System, UrdfError, consistent_state
+from floatframe import Marker, RigidBody, SphericalJoint, System
+from floatframe.analyses import consistent_state
+from floatframe.errors import UrdfError
 from floatframe.files.importers.frames import Frame, rpy_of
 from floatframe.files.importers.mesh_files import mesh_path
 from floatframe.files.importers.read_urdf import read_urdf
 from floatframe.files.importers.robot import MeshFile, Pose
 from floatframe.files.importers.robot_system import range_of, robot_system
 from floatframe.files.importers.system_robot import robot_of_system, urdf_text, write_urdf
+from floatframe.joints import CoordinateCoupler
 from floatframe.model.rotations import rotation_exp, rotation_matrix
 from floatframe.model.shapes import Box, Cylinder, Mesh, Sphere
 from tests.floatframe.files.importers.examples import GRIPPER

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import SignalError
+from floatframe.errors import SignalError
 from floatframe.files.signals import Signal, angle_of_speed, frequency_map, order_cut, order_map
 from floatframe.files.signals.analysis import rotation_of
 

@@ -5,7 +5,7 @@ import pytest
 import scipy.io
 from numpy.testing import assert_allclose
 
-from floatframe import SignalError
+from floatframe.errors import SignalError
 from floatframe.files.signals import read_signals
 from floatframe.files.signals.mat_file import elements, sound_variables
 

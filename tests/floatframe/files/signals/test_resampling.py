@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.interpolate import PchipInterpolator
 
-from floatframe import SignalError
+from floatframe.errors import SignalError
 from floatframe.files.signals import Signal, filtered, integrated_twice, resampled, without_drift
 from floatframe.files.signals.analysis import even_signals
 from floatframe.files.signals.signals import Signals

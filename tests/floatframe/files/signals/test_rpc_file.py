@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from rpc_reader.rpc_reader import ReadRPC
 
-from floatframe import SignalError
+from floatframe.errors import SignalError
 from floatframe.files.signals import Signals, read_signals, write_rpc
 
 

@@ -3,7 +3,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from fe_models.foundation.units import UNIT_SYSTEMS
-from floatframe import SignalError
+from floatframe.errors import SignalError
 from floatframe.files.signals import Signal
 from floatframe.files.signals.signal_units import parsed_unit, per_hertz, system_factor, unit_factor
 from floatframe.results.sensors.measurement import unit_words

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from pyyeti import psd as pyyeti_psd
 
-from floatframe import SignalError
+from floatframe.errors import SignalError
 from floatframe.files.signals import (
     WINDOWS,
     Signal,

@@ -5,8 +5,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 import cms
-from floatframe import AddedMass, FlexibleBody, FloatframeError, RigidBody, with_masses
+from floatframe import FlexibleBody, RigidBody
+from floatframe.errors import FloatframeError
 from floatframe.files.system_file.read_system import read_system
+from floatframe.model import AddedMass, with_masses
 from floatframe.model.bodies.mass_properties import combined, mass_properties, point_mass
 from floatframe.model.bodies.mode_choice import frozen_to_rigid, with_modes, without_modes
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness

@@ -153,7 +153,7 @@ def test_the_module_of_a_function_is_a_file_of_the_system(folder):
 )
 def test_a_controller_that_cannot_be_is_told(folder, law, words):
     (folder / "broken.py").write_text("1 / 0")
-    with pytest.raises(ff.SystemFileError, match=words):
+    with pytest.raises(ff.errors.SystemFileError, match=words):
         read_system(written(folder, law.replace("{start}", "0.3")))
 
 
@@ -168,5 +168,5 @@ def test_a_controller_that_cannot_be_is_told(folder, law, words):
 def test_names_of_controllers_are_checked_when_the_file_is_read(folder, old, new, words):
     path = written(folder, KINDS["matrices"])
     path.write_text(path.read_text().replace(old, new))
-    with pytest.raises(ff.SystemFileError, match=words):
+    with pytest.raises(ff.errors.SystemFileError, match=words):
         read_system(path)

@@ -4,35 +4,17 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from floatframe import (
-    GROUND,
-    AxialDistance,
-    Bushing,
-    ControlSensor,
-    CoordinateCoupler,
-    CouplerSensor,
-    FloatframeError,
-    Gravity,
-    JointCoordinate,
-    Marker,
-    PointDistance,
-    PrismaticJoint,
-    RevoluteJoint,
-    RigidBody,
-    RollingDisc,
-    SphereContact,
-    System,
-    UserForce,
-    coupler_motion,
-    integrate,
-    measured,
-    user_force_motion,
-)
+from floatframe import GROUND, Gravity, Marker, PrismaticJoint, RevoluteJoint, RigidBody, System, UserForce, integrate
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.kernels.records import leaves
+from floatframe.errors import FloatframeError
 from floatframe.files.system_file.read_system import read_system
 from floatframe.files.system_file.recorded_system import recorded_system
+from floatframe.forces import Bushing, SphereContact
+from floatframe.joints import AxialDistance, CoordinateCoupler, JointCoordinate, PointDistance, RollingDisc
 from floatframe.model.functions.time_functions import harmonic, table
+from floatframe.results import coupler_motion, user_force_motion
+from floatframe.sensors import ControlSensor, CouplerSensor, measured
 
 MACHINE = """
 [system]

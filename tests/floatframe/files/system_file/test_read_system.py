@@ -8,23 +8,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import cms
 import floatframe
-from floatframe import (
-    Event,
-    FixedJoint,
-    GeneralizedAlpha,
-    Gravity,
-    PointForce,
-    RevoluteJoint,
-    SystemFileError,
-    hht,
-    integrate,
-    newmark,
-    trapezoidal,
-)
+from floatframe import FixedJoint, GeneralizedAlpha, Gravity, PointForce, RevoluteJoint, integrate
+from floatframe.errors import SystemFileError
 from floatframe.files.system_file.connections import ELSEWHERE
 from floatframe.files.system_file.read_system import read_system
+from floatframe.integrators import hht, newmark, trapezoidal
 from floatframe.model.joints import JOINTS
 from floatframe.model.rotations import euler_parameters_of_rotation_vector
+from floatframe.simulation import Event
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 
 SWING = """

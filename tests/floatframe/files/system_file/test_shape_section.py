@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import FloatframeError
+from floatframe.errors import FloatframeError
 from floatframe.files.system_file.read_system import read_system
 from floatframe.files.system_file.shape_section import PLACE_KEYS, ShapeSection, keys_of
 from floatframe.model.shapes import GEOMETRIES, Mesh, Track, Wheel

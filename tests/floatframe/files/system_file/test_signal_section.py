@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import SystemFileError
+from floatframe.errors import SystemFileError
 from floatframe.files.signals import Signals, write_rpc
 from floatframe.files.system_file.read_system import read_system
 from floatframe.model.functions.tables import acceleration_table, linear_table, quintic_table

@@ -8,19 +8,18 @@ from numpy.testing import assert_allclose
 
 from floatframe import (
     GROUND,
-    AddedMass,
     FixedJoint,
     FlexibleBody,
     GeneralizedAlpha,
     Gravity,
     Marker,
-    ModelError,
     RigidBody,
     SphericalJoint,
     System,
     integrate,
-    with_masses,
 )
+from floatframe.errors import ModelError
+from floatframe.model import AddedMass, with_masses
 from tests.floatframe.engine.kernels.examples import turned_triad
 from tests.floatframe.point_masses import (
     random_point_masses,

@@ -19,7 +19,7 @@ def parts():
     """Return a steel bar of 1 m, held at one end, reduced in a nodal, in the mean-axis and in the Buckens frame."""
     coupled = cms.couple(bar(nx=10))
     modes = cms.craig_bampton(coupled, n_modes=4)
-    frames = (cms.NodalFrame("left"), cms.TisserandFrame(), cms.BuckensFrame())
+    frames = (cms.NodalFrame("left"), cms.TisserandFrame(), cms.reduction.BuckensFrame())
     return [cms.reduce(coupled, modes, frame=frame, geometric=False) for frame in frames]
 
 
@@ -73,6 +73,6 @@ def test_a_body_keeps_its_motion_when_its_kept_nodes_are_dropped(parts):
 
 def test_a_converted_part_moves_as_the_part_reduced_in_that_frame(parts):
     """The file alone carries a part into another frame; what is left of the difference is the Newton tolerance."""
-    converted = cms.convert_frame(parts[0], cms.BuckensFrame())
+    converted = cms.reduction.convert_frame(parts[0], cms.reduction.BuckensFrame())
     expected, _ = tip_path(parts[2], 2000.0)
     assert np.abs(tip_path(converted, 2000.0)[0] - expected).max() < 1e-6 * np.abs(expected - expected[0]).max()

@@ -10,12 +10,12 @@ from floatframe import (
     GeneralizedAlpha,
     Gravity,
     Marker,
-    ModelError,
     RevoluteJoint,
     RigidBody,
     System,
     integrate,
 )
+from floatframe.errors import ModelError
 from floatframe.model.bodies.mass_properties import combined, mass_properties, point_mass
 from floatframe.model.bodies.mode_choice import frozen_to_rigid, with_modes, without_modes
 from floatframe.model.rotations import rotation_exp

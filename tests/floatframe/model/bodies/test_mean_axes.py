@@ -26,17 +26,17 @@ FRAMES = {
     "root": cms.NodalFrame("root"),
     "tip, turned axes, origin elsewhere": cms.NodalFrame("tip", origin=(0.3, -0.2, 0.1), axes=AXES),
     "both ends": cms.NodalFrame(dofs=((0, 0), (0, 1), (0, 2), (0, 3), (LAST, 1), (LAST, 2))),
-    "Buckens": cms.BuckensFrame(),
+    "Buckens": cms.reduction.BuckensFrame(),
 }
 
 
 @pytest.fixture(scope="module")
 def bodies():
     """Return a slender beam, bent in two planes, twisted and stretched by its modes, in several frames."""
-    mesh = fm.straight_line((0, 0, 0), (2.0, 0, 0), LAST)
-    ends = [fm.line_interface(mesh, name, fm.NodeIndices((k,))) for name, k in (("root", 0), ("tip", LAST))]
+    mesh = fm.beams.straight_line((0, 0, 0), (2.0, 0, 0), LAST)
+    ends = [fm.beams.line_interface(mesh, name, fm.beams.NodeIndices((k,))) for name, k in (("root", 0), ("tip", LAST))]
     alloy = fm.Material("alloy", E=7e10, nu=0.3, rho=2700.0)
-    section = fm.BeamProperty(fm.Rectangle(0.03, 0.02), alloy, orientation=(0, 1, 0))
+    section = fm.beams.BeamProperty(fm.beams.Rectangle(0.03, 0.02), alloy, orientation=(0, 1, 0))
     body = cms.couple(fm.beam_body(mesh, section, name="beam", units=cms.unit_system("m-kg-s"), interfaces=ends))
     modes = cms.craig_bampton(body, n_modes=2)
     frames = FRAMES | {"mean": cms.TisserandFrame()}

@@ -12,7 +12,9 @@ EPS = np.finfo(float).eps
 
 def test_recovery_rows_of_fewer_modes_are_those_of_a_motion_in_these_modes():
     part = cms.couple(bar(nx=2))
-    rows = cms.RecoveryRequest("loads", (cms.Rows("interface force"), cms.Rows("net force", about=(0.0, 0.0, 0.0))))
+    rows = cms.reduction.RecoveryRequest(
+        "loads", (cms.reduction.Rows("interface force"), cms.reduction.Rows("net force", about=(0.0, 0.0, 0.0)))
+    )
     reduced = cms.reduce(part, cms.craig_bampton(part, n_modes=3), geometric=False, recovery=[rows])
     z = np.random.default_rng(1).normal(size=(2, 6 + reduced.n_q))
     kept = [0, 1, 2, 3, 4, 5, 6 + 4, 6 + 1]

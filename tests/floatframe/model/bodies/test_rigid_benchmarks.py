@@ -239,9 +239,9 @@ def test_bricard_mechanism_moves_at_any_step():
 
 
 def boom(length, radius, material):
-    mesh = fm.straight_line((0, 0, 0), (length, 0, 0), 40)
-    ends = [fm.line_interface(mesh, name, fm.NodeSet(name)) for name in ("start", "end")]
-    section = fm.BeamProperty(fm.Circle(radius), material, shear=False, rotary_inertia=False)
+    mesh = fm.beams.straight_line((0, 0, 0), (length, 0, 0), 40)
+    ends = [fm.beams.line_interface(mesh, name, fm.selections.NodeSet(name)) for name in ("start", "end")]
+    section = fm.beams.BeamProperty(fm.beams.Circle(radius), material, shear=False, rotary_inertia=False)
     body = cms.couple(fm.beam_body(mesh, section, name="boom", units=cms.unit_system("m-kg-s"), interfaces=ends))
     return cms.reduce(body, cms.craig_bampton(body, n_modes=60))
 

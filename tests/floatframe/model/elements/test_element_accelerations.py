@@ -9,26 +9,24 @@ from numpy.testing import assert_allclose
 
 from floatframe import (
     GROUND,
-    Bushing,
-    Channel,
-    ElementSensor,
     FixedJoint,
     GeneralizedAlpha,
     Marker,
-    ModelError,
     PrismaticJoint,
     RigidBody,
     System,
-    check_element,
-    element_motion,
     frequency_response,
     integrate,
     kinematics,
     linearize,
-    open_equations,
     system_modes,
 )
+from floatframe.analyses import check_element, open_equations
+from floatframe.errors import ModelError
+from floatframe.forces import Bushing
 from floatframe.model.elements import Element, ElementLaw
+from floatframe.results import element_motion
+from floatframe.sensors import Channel, ElementSensor
 from tests.floatframe.finite_differences import assert_tangent_is_exact
 from tests.floatframe.model.elements.element_accelerations_examples import INERTIA, MASS, Heavy, pair
 

@@ -9,41 +9,32 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from floatframe import (
     GROUND,
-    ConvergenceError,
-    Element,
-    ElementLaw,
-    ElementSensor,
-    EnergyDecaying,
-    EnergyMomentum,
-    Event,
     GeneralizedAlpha,
     Gravity,
-    Ida,
     Marker,
-    ModelError,
-    PlaceSensor,
     PrismaticJoint,
-    ResultsError,
     RigidBody,
     SpringDamper,
     System,
-    check_element,
-    element_motion,
     integrate,
     inverse_dynamics,
     kinematics,
-    newmark,
-    open_equations,
-    resume,
-    sensitivities,
 )
+from floatframe.analyses import check_element, open_equations
+from floatframe.design import sensitivities
 from floatframe.engine.open_equations import radau, rattle
+from floatframe.errors import ConvergenceError, ModelError, ResultsError
+from floatframe.integrators import EnergyDecaying, EnergyMomentum, Ida, newmark
 from floatframe.integrators.relative import RelativeGeneralizedAlpha
 from floatframe.integrators.relative_ode import METHODS, RelativeOde
 from floatframe.integrators.variational import Variational
+from floatframe.model import Element, ElementLaw
 from floatframe.model.elements import POSITION
 from floatframe.model.functions.time_functions import harmonic
+from floatframe.results import element_motion
 from floatframe.results.sensors import measured
+from floatframe.sensors import ElementSensor, PlaceSensor
+from floatframe.simulation import Event, resume
 from tests.floatframe.model.elements.laws import Circuit, Disc, Jack, Spring
 from tests.floatframe.model.elements.public_elements_examples import METHOD
 

@@ -7,29 +7,23 @@ from scipy.integrate import solve_ivp
 
 from floatframe import (
     GROUND,
-    BaseMotion,
-    Channel,
-    Column,
-    ElementSensor,
     GeneralizedAlpha,
     Marker,
-    ModelError,
-    PlaceSensor,
     RigidBody,
-    RollingDisc,
     SpringDamper,
     System,
-    consistent_state,
-    element_motion,
     frequency_response,
     integrate,
     linearize,
-    named_state_space,
-    root_locus,
     static_equilibrium,
     system_modes,
 )
+from floatframe.analyses import BaseMotion, Column, consistent_state, named_state_space, root_locus
+from floatframe.errors import ModelError
+from floatframe.joints import RollingDisc
+from floatframe.results import element_motion
 from floatframe.results.energy_balance import balance_defect, energy_scale
+from floatframe.sensors import Channel, ElementSensor, PlaceSensor
 from tests.floatframe.finite_differences import assert_tangent_is_exact
 from tests.floatframe.model.elements.element_states_examples import DAMPER, MASS, SPRING, G, disc, jack_matrix, lifted
 from tests.floatframe.model.elements.laws import Circuit, Disc, Spring

@@ -6,22 +6,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import (
-    GROUND,
-    Bushing,
-    Gravity,
-    Marker,
-    ModelError,
-    RigidBody,
-    System,
-    check_element,
-    element_motion,
-    integrate,
-    point_motion,
-)
+from floatframe import GROUND, Gravity, Marker, RigidBody, System, integrate
+from floatframe.analyses import check_element
+from floatframe.errors import ModelError
 from floatframe.files.system_file.read_system import read_system
+from floatframe.forces import Bushing
 from floatframe.model.elements.expressions import ExpressionElement
 from floatframe.model.functions.time_functions import harmonic
+from floatframe.results import element_motion, point_motion
 from floatframe.results.energy_balance import balance_defect, energy_scale
 from tests.floatframe.finite_differences import assert_tangent_is_exact
 from tests.floatframe.model.elements.expression_element_examples import as_expressions

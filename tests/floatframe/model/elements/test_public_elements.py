@@ -6,13 +6,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import (
-    SphericalJoint,
-    consistent_state,
-    element_motion,
-    integrate,
-    point_motion,
-)
+from floatframe import SphericalJoint, integrate
+from floatframe.analyses import consistent_state
+from floatframe.results import element_motion, point_motion
 from floatframe.results.energy_balance import balance_defect, energy_scale
 from floatframe.results.sensors import ElementSensor, measured, measurement_of
 from tests.floatframe.finite_differences import assert_tangent_is_exact

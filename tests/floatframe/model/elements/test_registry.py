@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from floatframe import Marker, ModelError, SystemFileError, integrate
+from floatframe import Marker, integrate
+from floatframe.errors import ModelError, SystemFileError
 from floatframe.files.system_file.read_system import read_system
 from floatframe.model.elements.registry import element_class
 from tests.floatframe.model.elements.public_elements_examples import METHOD, as_elements, places

@@ -9,21 +9,13 @@ from numba import njit
 from numpy.testing import assert_allclose
 
 from fe_models.foundation.units import unit_system
-from floatframe import (
-    GROUND,
-    AxialDistance,
-    GeneralizedAlpha,
-    Marker,
-    RelativeOde,
-    RigidBody,
-    System,
-    UserForce,
-    consistent_state,
-    integrate,
-)
+from floatframe import GROUND, GeneralizedAlpha, Marker, RigidBody, System, UserForce, integrate
+from floatframe.analyses import consistent_state
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.newton_equations import linearized, set_iterate
 from floatframe.engine.kernels.work import new_work
+from floatframe.integrators import RelativeOde
+from floatframe.joints import AxialDistance
 from floatframe.model.elements import POSITION, VELOCITY, Element, ElementLaw
 
 DIRECTION = np.array([2.0, -1.0, 2.0]) / 3

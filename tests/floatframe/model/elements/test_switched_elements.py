@@ -9,21 +9,21 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from floatframe import (
     GROUND,
-    Event,
     GeneralizedAlpha,
     Gravity,
     Marker,
-    ModelError,
     PrismaticJoint,
     RigidBody,
     SpringDamper,
     System,
-    element_motion,
     integrate,
 )
+from floatframe.errors import ModelError
 from floatframe.model.elements import Element, ElementLaw
 from floatframe.model.elements.switched_off import SwitchedOff
+from floatframe.results import element_motion
 from floatframe.results.energy_balance import balance_defect
+from floatframe.simulation import Event
 from tests.floatframe.finite_differences import assert_tangent_is_exact
 from tests.floatframe.model.elements.laws import Ball, Spring
 

@@ -2,18 +2,9 @@
 
 import numpy as np
 
-from floatframe import (
-    GROUND,
-    Bushing,
-    FlexibleBody,
-    Gravity,
-    JointCoordinate,
-    Marker,
-    RevoluteJoint,
-    RigidBody,
-    System,
-    UserForce,
-)
+from floatframe import GROUND, FlexibleBody, Gravity, Marker, RevoluteJoint, RigidBody, System, UserForce
+from floatframe.forces import Bushing
+from floatframe.joints import JointCoordinate
 from floatframe.model.functions.time_functions import smooth_step
 from tests.floatframe.engine.kernels.examples import turned_triad
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness

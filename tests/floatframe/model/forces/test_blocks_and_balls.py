@@ -5,14 +5,15 @@ import pytest
 from numpy.testing import assert_allclose
 
 import floatframe as ff
-from floatframe import GeneralizedAlpha, Gravity, JointForce, Marker, PrismaticJoint, RigidBody, SphereContact, System
+from floatframe import GeneralizedAlpha, Gravity, JointForce, Marker, PrismaticJoint, RigidBody, System
+from floatframe.forces import SphereContact
 
 G = 9.81
 GROUND, BODY = Marker("ground"), Marker("b")
 FIELD = Gravity((0, 0, -G))
 METHODS = {
     "default": GeneralizedAlpha(),
-    "momentum": ff.EnergyMomentum(),
+    "momentum": ff.integrators.EnergyMomentum(),
     "controlled": GeneralizedAlpha(error_tolerance=1e-6),
 }
 WAY = 2.0**2 / (2 * 0.4 * G)  #: of a block of 2 m/s under mu = 0.4

@@ -5,21 +5,13 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from floatframe import (
-    GROUND,
-    Bushing,
-    GeneralizedAlpha,
-    Gravity,
-    Marker,
-    ModelError,
-    RigidBody,
-    System,
-    integrate,
-)
+from floatframe import GROUND, GeneralizedAlpha, Gravity, Marker, RigidBody, System, integrate
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.newton_equations import set_iterate
 from floatframe.engine.kernels.entry import evaluate_and_linearize
 from floatframe.engine.kernels.work import new_work
+from floatframe.errors import ModelError
+from floatframe.forces import Bushing
 from floatframe.model.functions.time_functions import table
 from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_matrix
 from floatframe.model.state import State

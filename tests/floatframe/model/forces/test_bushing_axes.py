@@ -6,27 +6,20 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import (
-    GROUND,
-    Bushing,
-    BushingSensor,
+from floatframe import GROUND, GeneralizedAlpha, Marker, RevoluteJoint, RigidBody, System, integrate
+from floatframe.forces import Bushing
+from floatframe.integrators import (
     EnergyDecaying,
     EnergyMomentum,
-    Event,
-    GeneralizedAlpha,
     Ida,
-    Marker,
-    PlanarJoint,
     RelativeGeneralizedAlpha,
     RelativeOde,
-    RevoluteJoint,
-    RigidBody,
-    System,
     Variational,
-    integrate,
-    measured,
 )
+from floatframe.joints import PlanarJoint
 from floatframe.model.rotations import euler_parameters, rotation_exp
+from floatframe.sensors import BushingSensor, measured
+from floatframe.simulation import Event
 
 A = rotation_exp(np.array([0.4, -0.7, 0.3]))  #: axes of the bearing; the rotor spins about the third
 PLACE = np.array([3.0, -2.0, 5.0])

@@ -32,7 +32,7 @@ def acceleration(force, motion):
         force = replace(force, coordinate="angle")
     pull = (0.0, 0.0, -DOWN) if motion == "along" else (0.0, -DOWN * MASS / 3.0, 0.0)  # across the axis, alike
     system = ff.System([body], [joint], [ff.Gravity(pull), force])
-    found = ff.consistent_state(system, t=T).u_dot
+    found = ff.analyses.consistent_state(system, t=T).u_dot
     return found[0] if motion == "along" else found[5]
 
 
@@ -72,7 +72,7 @@ def wrench_on_ball(force, place):
     turned = AXES_A * Rotation.from_rotvec(AXES_B)
     ball = ff.RigidBody("b", MASS, J_BALL, position=place, orientation=np.roll(turned.as_quat(), 1), velocity=VELOCITY,
                         omega_B=OMEGA)  # fmt: skip
-    u_dot = ff.consistent_state(ff.System([ball], [], [force])).u_dot
+    u_dot = ff.analyses.consistent_state(ff.System([ball], [], [force])).u_dot
     return MASS * u_dot[:3], J_BALL @ u_dot[3:6] + np.cross(OMEGA, J_BALL @ OMEGA)
 
 
@@ -82,7 +82,7 @@ def on_ground():
 
 
 ENTRIES = np.random.default_rng(8).uniform(0.5, 2.0, (2, 6, 6))
-SLEEVE = ff.Bushing(
+SLEEVE = ff.forces.Bushing(
     "sleeve", on_ground(), ff.Marker("b"), 10 * (ENTRIES[0] + ENTRIES[0].T), ENTRIES[1] + 9 * np.eye(6),
     np.array([1.0, -2.0, 3.0, -1.5, 2.5, 0.5]), {"y": polynomial_of_time([0.0, 0.0, 40.0])},
 )  # fmt: skip
@@ -125,7 +125,7 @@ def test_a_number_of_a_bushing_that_is_doubled_acts_as_the_formula_says(name, pl
     assert np.abs(np.concatenate(after) - np.concatenate(before)).max() > 1e-3
 
 
-TOUCH = ff.SphereContact("touch", on_ground(), ff.Marker("b"), radius_b=0.2, axis=np.array([1.0, 2.0, -2.0]) / 3,
+TOUCH = ff.forces.SphereContact("touch", on_ground(), ff.Marker("b"), radius_b=0.2, axis=np.array([1.0, 2.0, -2.0]) / 3,
                          stiffness=900.0, exponent=1.4, restitution=0.4, dissipation="hunt-crossley", friction=0.3,
                          friction_speed=0.25, slow=1.5)  # fmt: skip
 PAIR = replace(TOUCH, radius_a=0.3, stiffness=None, modulus=2e4, exponent=1.5)

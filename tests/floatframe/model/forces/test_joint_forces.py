@@ -8,24 +8,22 @@ from scipy.integrate import solve_ivp
 from fe_models.body.load_cases import ReducedLoadCase
 from floatframe import (
     GROUND,
-    BodyLoad,
-    CylindricalJoint,
     FlexibleBody,
     GeneralizedAlpha,
     JointForce,
     Marker,
-    ModelError,
-    PlanarJoint,
     PointForce,
     PrismaticJoint,
     RevoluteJoint,
     RigidBody,
     SpringDamper,
     System,
-    UniversalJoint,
     integrate,
 )
 from floatframe.engine.compiling.system import compiled_system
+from floatframe.errors import ModelError
+from floatframe.forces import BodyLoad
+from floatframe.joints import CylindricalJoint, PlanarJoint, UniversalJoint
 from floatframe.model.functions.time_functions import harmonic, smooth_step, table
 from tests.floatframe.engine.kernels.examples import C_K, Iterate, newton_matrices
 from tests.floatframe.model.joints.examples import AXIS, pair

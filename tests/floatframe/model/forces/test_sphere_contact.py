@@ -6,17 +6,9 @@ from numpy.testing import assert_allclose
 from scipy.integrate import quad
 from scipy.special import beta
 
-from floatframe import (
-    GROUND,
-    GeneralizedAlpha,
-    Gravity,
-    Marker,
-    ModelError,
-    RigidBody,
-    SphereContact,
-    System,
-    integrate,
-)
+from floatframe import GROUND, GeneralizedAlpha, Gravity, Marker, RigidBody, System, integrate
+from floatframe.errors import ModelError
+from floatframe.forces import SphereContact
 from floatframe.model.forces.sphere_contact import exact_dissipation, hertz_stiffness
 from tests.floatframe.engine.kernels.examples import turned_triad
 from tests.floatframe.finite_differences import assert_tangent_is_exact

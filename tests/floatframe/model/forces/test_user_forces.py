@@ -10,18 +10,11 @@ from numpy.testing import assert_allclose
 
 from floatframe import (
     GROUND,
-    AxialDistance,
-    ConvergenceError,
-    CoordinateCoupler,
-    EnergyMomentum,
     FlexibleBody,
     GeneralizedAlpha,
     Gravity,
-    JointCoordinate,
     JointForce,
     Marker,
-    ModelError,
-    PointDistance,
     RevoluteJoint,
     RigidBody,
     SpringDamper,
@@ -29,17 +22,20 @@ from floatframe import (
     UserForce,
     integrate,
     linearize,
-    named_state_space,
-    resume,
     system_modes,
-    user_force_motion,
 )
+from floatframe.analyses import named_state_space
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.newton_equations import set_iterate
 from floatframe.engine.kernels.entry import evaluate_and_linearize
 from floatframe.engine.kernels.work import new_work
+from floatframe.errors import ConvergenceError, ModelError
+from floatframe.integrators import EnergyMomentum
+from floatframe.joints import AxialDistance, CoordinateCoupler, JointCoordinate, PointDistance
 from floatframe.model.functions.time_functions import harmonic, table
 from floatframe.model.state import State
+from floatframe.results import user_force_motion
+from floatframe.simulation import resume
 from tests.floatframe.engine.kernels.examples import turned_triad
 from tests.floatframe.finite_differences import assert_tangent_is_exact
 from tests.floatframe.model.forces.examples import HUB, J, pid, wheel

@@ -5,19 +5,9 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.interpolate import PchipInterpolator, make_interp_spline
 
-from floatframe import (
-    GROUND,
-    EnergyDecaying,
-    GeneralizedAlpha,
-    Marker,
-    ModelError,
-    PlaceSensor,
-    PrismaticJoint,
-    RigidBody,
-    System,
-    integrate,
-    measured,
-)
+from floatframe import GROUND, GeneralizedAlpha, Marker, PrismaticJoint, RigidBody, System, integrate
+from floatframe.errors import ModelError
+from floatframe.integrators import EnergyDecaying
 from floatframe.model.functions.tables import (
     INTERPOLATIONS,
     acceleration_table,
@@ -27,6 +17,7 @@ from floatframe.model.functions.tables import (
     quintic_table,
 )
 from floatframe.model.functions.time_functions import table
+from floatframe.sensors import PlaceSensor, measured
 
 ROUNDOFF = 1e-12
 T, PEAK = 0.011, 500.0  # half-sine shock of 11 ms

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import GROUND, Marker, ModelError, PrismaticJoint, RigidBody, System, consistent_state
+from floatframe import GROUND, Marker, PrismaticJoint, RigidBody, System
+from floatframe.analyses import consistent_state
+from floatframe.errors import ModelError
 from floatframe.model.functions.time_functions import (
     TimeFunction,
     constant,

@@ -5,7 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.interpolate import BPoly
 
-from floatframe import GROUND, Marker, ModelError, PrismaticJoint
+from floatframe import GROUND, Marker, PrismaticJoint
+from floatframe.errors import ModelError
 from floatframe.model.functions.path_motions import largest_size, path_motion, rest_to_rest_spline
 from floatframe.model.functions.point_to_point import quintic, trapezoid, trapezoids_together
 from floatframe.model.functions.time_functions import harmonic

@@ -5,6 +5,22 @@ import pytest
 
 from floatframe import (
     GROUND,
+    FixedJoint,
+    FlexibleBody,
+    Gravity,
+    JointForce,
+    Marker,
+    PrismaticJoint,
+    RevoluteJoint,
+    RigidBody,
+    SphericalJoint,
+    System,
+)
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.initial_conditions.newton_equations import set_iterate
+from floatframe.engine.kernels.entry import evaluate_and_linearize, rates_of_constraints
+from floatframe.engine.kernels.work import new_work
+from floatframe.joints import (
     AxialAngle,
     AxialDistance,
     ConstantOrientation,
@@ -12,29 +28,15 @@ from floatframe import (
     CoordinateCoupler,
     CylindricalJoint,
     DistanceJoint,
-    FixedJoint,
-    FlexibleBody,
-    Gravity,
     JointCoordinate,
-    JointForce,
-    Marker,
     PlanarJoint,
     PointDistance,
     PointOnLine,
     PointOnPlane,
-    PrismaticJoint,
-    RevoluteJoint,
-    RigidBody,
     RollingDisc,
     ScrewJoint,
-    SphericalJoint,
-    System,
     UniversalJoint,
 )
-from floatframe.engine.compiling.system import compiled_system
-from floatframe.engine.initial_conditions.newton_equations import set_iterate
-from floatframe.engine.kernels.entry import evaluate_and_linearize, rates_of_constraints
-from floatframe.engine.kernels.work import new_work
 from floatframe.model.joints.rows import is_held, is_held_velocity
 from tests.floatframe.engine.kernels.examples import turned_triad
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness

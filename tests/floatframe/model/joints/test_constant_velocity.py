@@ -4,21 +4,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import (
-    GROUND,
-    ConstantVelocityJoint,
-    GeneralizedAlpha,
-    Marker,
-    ModelError,
-    PointForce,
-    PointOnLine,
-    RevoluteJoint,
-    RigidBody,
-    System,
-    UniversalJoint,
-    consistent_state,
-    integrate,
-)
+from floatframe import GROUND, GeneralizedAlpha, Marker, PointForce, RevoluteJoint, RigidBody, System, integrate
+from floatframe.analyses import consistent_state
+from floatframe.errors import ModelError
+from floatframe.joints import ConstantVelocityJoint, PointOnLine, UniversalJoint
 from floatframe.model.functions.time_functions import polynomial_of_time
 from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_exp, rotation_log, rotation_matrix
 from floatframe.results.joint_coordinates import joint_coordinate

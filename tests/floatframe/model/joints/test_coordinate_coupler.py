@@ -8,22 +8,21 @@ from numpy.testing import assert_allclose
 
 from floatframe import (
     GROUND,
-    CoordinateCoupler,
     GeneralizedAlpha,
     Gravity,
-    JointCoordinate,
     JointForce,
     Marker,
-    ModelError,
     PrismaticJoint,
     RevoluteJoint,
     RigidBody,
     System,
     integrate,
-    mobility,
 )
+from floatframe.analyses import mobility
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.initial import consistent_motion
+from floatframe.errors import ModelError
+from floatframe.joints import CoordinateCoupler, JointCoordinate
 from floatframe.model.functions.time_functions import harmonic, polynomial_of_time
 from floatframe.model.rotations import euler_parameters, rotation_exp
 from floatframe.results.coordinate_elements import coupler_motion

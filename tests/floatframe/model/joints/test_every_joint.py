@@ -6,30 +6,31 @@ from numpy.testing import assert_allclose
 
 from floatframe import (
     GROUND,
-    CylindricalJoint,
-    DistanceJoint,
     GeneralizedAlpha,
     Gravity,
     Marker,
-    ModelError,
-    PlanarJoint,
-    PointOnLine,
-    PointOnPlane,
     PrismaticJoint,
-    ResultsError,
     RevoluteJoint,
     RigidBody,
-    ScrewJoint,
     System,
-    UniversalJoint,
-    consistent_state,
     integrate,
 )
+from floatframe.analyses import consistent_state
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.newton_equations import displaced
 from floatframe.engine.kernels.compiler.compilation import entry
 from floatframe.engine.kernels.connections.connection import write_velocity_gaps
 from floatframe.engine.kernels.entry import as_model, as_work, rates_of_constraints
+from floatframe.errors import ModelError, ResultsError
+from floatframe.joints import (
+    CylindricalJoint,
+    DistanceJoint,
+    PlanarJoint,
+    PointOnLine,
+    PointOnPlane,
+    ScrewJoint,
+    UniversalJoint,
+)
 from floatframe.model.functions.time_functions import harmonic, polynomial_of_time
 from floatframe.model.joints.rows import is_held_position
 from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_exp, rotation_matrix

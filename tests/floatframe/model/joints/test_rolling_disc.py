@@ -4,21 +4,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import (
-    GROUND,
-    GeneralizedAlpha,
-    Gravity,
-    Marker,
-    ModelError,
-    RigidBody,
-    RollingDisc,
-    System,
-    consistent_state,
-    integrate,
-    linearize,
-    mobility,
-)
+from floatframe import GROUND, GeneralizedAlpha, Gravity, Marker, RigidBody, System, integrate, linearize
+from floatframe.analyses import consistent_state, mobility
 from floatframe.engine.compiling.system import compiled_system
+from floatframe.errors import ModelError
+from floatframe.joints import RollingDisc
 from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_matrix
 
 M, R, G = 2.0, 0.5, 9.81

@@ -9,32 +9,29 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 import cms
+import fe_models
 from floatframe import (
     GROUND,
-    ConstantOrientation,
     FlexibleBody,
-    FloatframeError,
     GeneralizedAlpha,
     Gravity,
     Marker,
-    ModelError,
     PointForce,
-    PointOnLine,
     PrismaticJoint,
     RevoluteJoint,
     RigidBody,
-    SlidingJoint,
     SphericalJoint,
     System,
-    consistent_state,
     integrate,
-    mobility,
     static_equilibrium,
 )
+from floatframe.analyses import consistent_state, mobility
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.newton_equations import displaced, linearized, set_iterate
 from floatframe.engine.kernels.work import new_work
+from floatframe.errors import FloatframeError, ModelError
 from floatframe.files.system_file.read_system import read_system
+from floatframe.joints import ConstantOrientation, PointOnLine, SlidingJoint
 from floatframe.model.bodies.mode_choice import frozen_to_rigid
 from floatframe.model.functions.time_functions import polynomial_of_time
 from floatframe.results.joint_coordinates import joint_coordinate
@@ -50,9 +47,9 @@ FIRST, *FURTHER = STATIONS
 
 
 def beam(EI=EI, **options):
-    line = cms.BeamLine(LENGTH, RHO_A, 1e6, EI, EI, 50.0, rho_Iy=1e-5, rho_Iz=1e-5)
+    line = fe_models.beams.BeamLine(LENGTH, RHO_A, 1e6, EI, EI, 50.0, rho_Iy=1e-5, rho_Iz=1e-5)
     values = {"n_axial": 1, "n_bending": 8, "n_torsion": 1, "geometric": False} | options
-    return cms.beam_from_assumed_modes(line, name="beam", units=UNITS, stations=STATIONS, **values)
+    return cms.reduction.beam_from_assumed_modes(line, name="beam", units=UNITS, stations=STATIONS, **values)
 
 
 def slider(mass, x, velocity=(0, 0, 0), **options):

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import GeneralizedAlpha, integrate, linearize, static_equilibrium, system_modes, view, view_modes
+from floatframe import GeneralizedAlpha, integrate, linearize, static_equilibrium, system_modes, view
+from floatframe.pictures import view_modes
 from floatframe.results.recovery import nodal_positions
 from tests.cms.browser import browser, opened
 from tests.floatframe.pictures.viewer.examples import SIZE, swinging

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import GROUND, FlexibleBody, Marker, ResultsError, SphericalJoint, System, linearize, system_modes
+from floatframe import GROUND, FlexibleBody, Marker, SphericalJoint, System, linearize, system_modes
+from floatframe.errors import ResultsError
 from floatframe.model.rotations import rotation_exp, rotation_matrix
 from floatframe.pictures.mode_film import LARGEST_TURN, SWING, mode_scene
 from floatframe.pictures.viewer.modes_view import view_modes

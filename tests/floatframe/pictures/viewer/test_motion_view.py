@@ -15,7 +15,6 @@ from floatframe import (
     GeneralizedAlpha,
     Gravity,
     Marker,
-    ResultsError,
     RevoluteJoint,
     RigidBody,
     System,
@@ -24,7 +23,7 @@ from floatframe import (
     view,
 )
 from floatframe.components import wheels
-from floatframe.errors import ModelError
+from floatframe.errors import ModelError, ResultsError
 from floatframe.model.rotations import rotation_matrix
 from floatframe.model.shapes import Arrow, Box, MarkerShapes, Road, Shape, Stretched, Wheel
 from floatframe.model.shapes.drawn import SPRING

@@ -21,7 +21,7 @@ EI = STEEL.E * 0.02 * 0.01**3 / 12
 def bars():
     """A slender bar on its left end, and the free one."""
     body = cms.couple(bar_of_beams(16, section=SECTION))
-    with cms.Families(body) as families:
+    with cms.modes.Families(body) as families:
         modes = cms.craig_bampton(families, n_modes=12)
         return [cms.reduce(families, modes, frame=frame, geometric=True) for frame in (NodalFrame("left"), None)]
 
@@ -75,7 +75,7 @@ def test_the_record_names_the_loads_and_is_a_number(bars):
 
 
 def test_other_units_are_the_same_loads(bars):
-    mm = by_name(cms.convert_units(bars[0], "mm-t-s"))
+    mm = by_name(cms.body.convert_units(bars[0], "mm-t-s"))
     for name, load in by_name(bars[0]).items():
         scale = {"m/s²": 1e3, "N m": 1e3}.get(load.unit, 1.0)
         assert_allclose([mm[name].along, mm[name].against], [load.along * scale, load.against * scale], rtol=1e-9)

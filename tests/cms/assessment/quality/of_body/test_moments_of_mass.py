@@ -17,9 +17,9 @@ from tests.bodies import STEEL
 def frame(request):
     """Two stout beams across each other, with and without rotary inertia of bending."""
     points = np.array([(0, 0, 0), (0.5, 0, 0), (1, 0, 0), (0.5, 0.5, 0), (0.5, 1, 0)], dtype=float)
-    mesh = fm.LineMesh(points, [(0, 1), (1, 2), (1, 3), (3, 4)])
-    section = fm.BeamProperty(fm.Rectangle(0.2, 0.1), STEEL, rotary_inertia=request.param)
-    joint = fm.line_interface(mesh, "left", fm.NodeIndices((0,)))
+    mesh = fm.beams.LineMesh(points, [(0, 1), (1, 2), (1, 3), (3, 4)])
+    section = fm.beams.BeamProperty(fm.beams.Rectangle(0.2, 0.1), STEEL, rotary_inertia=request.param)
+    joint = fm.beams.line_interface(mesh, "left", fm.beams.NodeIndices((0,)))
     body = fm.beam_body(mesh, section, name="cross", units=fm.unit_system("m-kg-s"), interfaces=[joint])
     body = cms.couple(body)
     return request.param, cms.reduce(body, cms.craig_bampton(body, n_modes=12))

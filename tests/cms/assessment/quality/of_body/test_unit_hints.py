@@ -19,7 +19,7 @@ SI = unit_system("m-kg-s")
 @pytest.fixture(scope="module")
 def reduced():
     body = cms.couple(bar(nx=4, kind="hexahedron"))
-    return cms.reduce(body, cms.craig_bampton_ir(body, n_modes=2))
+    return cms.reduce(body, cms.modes.craig_bampton_ir(body, n_modes=2))
 
 
 def test_a_steel_bar_is_plausible_and_in_other_units_it_is_not(reduced):
@@ -51,16 +51,18 @@ OBLIQUE = np.array([0.48, -0.6, 0.64])  #: a unit vector
 
 def rod(length, steel, units, section):
     """A rod along an oblique line, reduced."""
-    line = fm.straight_line((0.3, 0.1, -0.2), np.array([0.3, 0.1, -0.2]) + length * OBLIQUE, 8)
-    ends = [fm.line_interface(line, name, fm.NodeSet(name)) for name in ("start", "end")]
-    body = cms.couple(fm.beam_body(line, fm.BeamProperty(section, steel), name="rod", units=units, interfaces=ends))
+    line = fm.beams.straight_line((0.3, 0.1, -0.2), np.array([0.3, 0.1, -0.2]) + length * OBLIQUE, 8)
+    ends = [fm.beams.line_interface(line, name, fm.selections.NodeSet(name)) for name in ("start", "end")]
+    body = cms.couple(
+        fm.beam_body(line, fm.beams.BeamProperty(section, steel), name="rod", units=units, interfaces=ends)
+    )
     return cms.reduce(body, cms.craig_bampton(body, 4))
 
 
 def test_a_mesh_in_mm_with_a_material_in_si_is_warned_of(caplog):
     """The shipped rod is 328 mm long; its numbers read as metres make it swing at 1 Hz, with the density of steel."""
     steel = fm.Material("steel", E=2.1e11, nu=0.3, rho=7850.0)
-    reduced = rod(328.0, steel, "m-kg-s", fm.Rectangle(20.0, 30.0))
+    reduced = rod(328.0, steel, "m-kg-s", fm.beams.Rectangle(20.0, 30.0))
     (warning,) = [record.getMessage() for record in caplog.records]
     size = float(np.linalg.norm(np.ptp(reduced.nodes, axis=0)))
     slow = f"{size:.4g} m large and vibrates from {reduced.free_frequencies[0]:.4g} Hz on"
@@ -68,13 +70,13 @@ def test_a_mesh_in_mm_with_a_material_in_si_is_warned_of(caplog):
     assert f"expected 0.0001 to 50 m: is the mesh in m? (in mm the same numbers make {size / 1e3:.4g} m" in warning
     assert check_units(reduced).verdict == "warn"
     caplog.clear()
-    rod(328.0, fm.Material("steel", E=2.1e5, nu=0.3, rho=7.85e-9), "mm-t-s", fm.Rectangle(20.0, 30.0))
+    rod(328.0, fm.Material("steel", E=2.1e5, nu=0.3, rho=7.85e-9), "mm-t-s", fm.beams.Rectangle(20.0, 30.0))
     assert not caplog.records
 
 
 def test_a_body_in_m_read_in_mm_with_a_material_in_mm_is_warned_of(caplog):
     """A rod of 70 mm whose numbers are read as 0.07 mm."""
-    rod(0.07, fm.Material("steel", E=2.1e5, nu=0.3, rho=7.85e-9), "mm-t-s", fm.Rectangle(0.002, 0.003))
+    rod(0.07, fm.Material("steel", E=2.1e5, nu=0.3, rho=7.85e-9), "mm-t-s", fm.beams.Rectangle(0.002, 0.003))
     assert "units mm-t-s: the body is 0.07" in caplog.text
     assert "expected 0.0001 to 1000 m: is the mesh in mm? (in m the same numbers make 0.07" in caplog.text
 
@@ -118,11 +120,13 @@ def test_a_body_made_in_python_of_no_solid_is_warned_of(kind, caplog):
     if kind == "solid":
         fm.solid_body(box_mesh(2, 1, 1, 2.0, 1.0, 0.5), steel, name="box", units=SI)
     elif kind == "beam":
-        line = fm.straight_line((0, 0, 0), OBLIQUE, 3)
-        fm.beam_body(line, fm.BeamProperty(fm.Rectangle(0.02, 0.03), steel), name="box", units=SI)
+        line = fm.beams.straight_line((0, 0, 0), OBLIQUE, 3)
+        fm.beam_body(line, fm.beams.BeamProperty(fm.beams.Rectangle(0.02, 0.03), steel), name="box", units=SI)
     else:
-        layers = fm.LaminateProperty((fm.Layer(foam, 0.02), fm.Layer(steel, 0.001)), direction=(1, 0, 0))
-        plate = fm.ShellMesh(np.eye(4)[:, :3] + OBLIQUE, {"triangle": np.array([[0, 1, 2], [0, 3, 1]])})
+        layers = fm.shells.LaminateProperty(
+            (fm.shells.Layer(foam, 0.02), fm.shells.Layer(steel, 0.001)), direction=(1, 0, 0)
+        )
+        plate = fm.shells.ShellMesh(np.eye(4)[:, :3] + OBLIQUE, {"triangle": np.array([[0, 1, 2], [0, 3, 1]])})
         fm.shell_body(plate, layers, name="box", units=SI)
     (warning,) = [record.getMessage() for record in caplog.records]
     assert warning.startswith("body 'box': units m-kg-s: density of 'steel' 7.85e-09 kg/m³ = 7.85e-09 kg/m³; expected")

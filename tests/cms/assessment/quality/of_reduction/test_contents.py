@@ -99,12 +99,14 @@ def solid():
 def frame():
     """Beams with stress points: what the solid has not."""
     points = np.array([(3, 1, 2), (3.5, 1.1, 2), (4, 1, 2.1), (3.5, 1.1, 2.5), (4.2, 1.4, 2.4)])
-    mesh = fm.LineMesh(points, [(0, 1), (1, 2), (1, 3), (2, 4), (3, 4)])
-    joints = [fm.line_interface(mesh, name, fm.NodeIndices((k,))) for name, k in (("left", 0), ("right", 2))]
+    mesh = fm.beams.LineMesh(points, [(0, 1), (1, 2), (1, 3), (2, 4), (3, 4)])
+    joints = [
+        fm.beams.line_interface(mesh, name, fm.beams.NodeIndices((k,))) for name, k in (("left", 0), ("right", 2))
+    ]
     made = fm.beam_body(
-        mesh, fm.BeamProperty(fm.Rectangle(0.02, 0.04), STEEL), name="frame", units=SI, interfaces=joints
+        mesh, fm.beams.BeamProperty(fm.beams.Rectangle(0.02, 0.04), STEEL), name="frame", units=SI, interfaces=joints
     )
-    body = couple(fm.section_points(made, [0, 3]))
+    body = couple(fm.beams.section_points(made, [0, 3]))
     return Bench(body, cms.rubin(body, n_modes=3), ReductionOptions(RayleighDamping(2.0, 1e-6), None, True, True))
 
 

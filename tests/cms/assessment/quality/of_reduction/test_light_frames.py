@@ -15,7 +15,12 @@ from cms.assessment.quality.reference.free_basis import shape_rounding
 from fe_models.foundation.units import unit_system
 
 UNITS = unit_system("mm-t-s")
-SETS = {"craig-bampton": cms.craig_bampton, "rubin": cms.rubin, "herting": cms.herting, "craig-chang": cms.craig_chang}
+SETS = {
+    "craig-bampton": cms.craig_bampton,
+    "rubin": cms.rubin,
+    "herting": cms.modes.herting,
+    "craig-chang": cms.modes.craig_chang,
+}
 
 
 def light_frame(seed: int, density: float):
@@ -24,12 +29,14 @@ def light_frame(seed: int, density: float):
     n = int(rng.integers(5, 8))
     nodes = Rotation.random(random_state=seed).apply(1e3 * rng.normal(size=(n, 3))) + 3e4 * rng.normal(size=3)
     heavy = rng.choice(n, int(rng.integers(4, n + 1)), replace=False)
-    masses = [fm.PointMass(int(node), mass=1e-3 * float(rng.uniform(1, 20))) for node in heavy]
-    section = fm.BeamProperty(fm.Rectangle(50.0, 75.0), fm.Material("light", E=2e5, nu=0.3, rho=1e-12 * density))
+    masses = [fm.beams.PointMass(int(node), mass=1e-3 * float(rng.uniform(1, 20))) for node in heavy]
+    section = fm.beams.BeamProperty(
+        fm.beams.Rectangle(50.0, 75.0), fm.Material("light", E=2e5, nu=0.3, rho=1e-12 * density)
+    )
     ports = [
         fm.Interface("a", "nodes", np.array([0]), nodes[0]), fm.Interface("b", "rigid", np.array([n - 1]), nodes[-1]),
     ]  # fmt: skip
-    mesh = fm.LineMesh(nodes, np.array([(k, k + 1) for k in range(n - 1)]))
+    mesh = fm.beams.LineMesh(nodes, np.array([(k, k + 1) for k in range(n - 1)]))
     return cms.couple(fm.beam_body(mesh, section, name="light", units=UNITS, interfaces=ports, point_masses=masses))
 
 
@@ -64,7 +71,7 @@ def test_sets_with_nearly_dependent_columns_raise_no_alarm(seed, density, name):
 def test_a_file_of_a_set_with_other_rounding_raises_no_alarm(seed, density):
     """Columns of another machine differ in their last digit, which such a set amplifies."""
     body = light_frame(seed, density)
-    modes = cms.herting(body, 2)
+    modes = cms.modes.herting(body, 2)
     last_digit = 1 + np.finfo(float).eps * np.random.default_rng(seed).normal(size=modes.columns.shape)
     elsewhere = replace(modes, columns=np.asarray(modes.columns) * last_digit)
     assert verdicts(body, modes, cms.reduce(body, elsewhere))["same-body"] == "pass"

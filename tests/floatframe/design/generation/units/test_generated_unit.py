@@ -44,7 +44,7 @@ def robot():
 
 @pytest.fixture(scope="module", params=[2, 3])
 def unit(request, robot, folder):
-    return ff.generate_fmu(robot.system, folder / f"robot{request.param}.fmu", fmi=request.param)
+    return ff.design.generate_fmu(robot.system, folder / f"robot{request.param}.fmu", fmi=request.param)
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +106,7 @@ def mechanical_energy(case, z, z_dot):
 def charts(folder):
     """All joints there are, with gravity as a parameter, and their unit."""
     case = Case(all_charts())
-    return case, ff.generate_fmu(case.system, folder / "charts.fmu", parameters=["gravity"])
+    return case, ff.design.generate_fmu(case.system, folder / "charts.fmu", parameters=["gravity"])
 
 
 def test_a_tree_on_a_free_base_keeps_its_energy_and_moves_as_in_the_engine(charts):
@@ -120,7 +120,7 @@ def test_a_tree_on_a_free_base_keeps_its_energy_and_moves_as_in_the_engine(chart
     size = 0.5 * case.z_dot @ case.model.mass_matrix(begin) @ case.z_dot
     assert_allclose(mechanical_energy(case, z, z_dot), energy, rtol=0, atol=1e-8 * size)
     state = case.model.state(begin, case.z_dot)
-    motion = ff.integrate(case.system, ff.trapezoidal(), T_END, 1e-3, formulation="relative", state=state)
+    motion = ff.integrate(case.system, ff.integrators.trapezoidal(), T_END, 1e-3, formulation="relative", state=state)
     assert_allclose(z, case.model.positions(motion.state(-1))[0], rtol=0, atol=1e-4 * np.abs(z).max())
     for k, name in enumerate(case.model.names):
         if name.endswith("parameter w"):
@@ -179,17 +179,19 @@ def test_a_flexible_arm_moves_as_in_the_engine_and_steps_follow_its_modes(folder
     """Its states are hinges and modes; torques act at the hinges."""
     parts = flexible_arm.links()
     system = flexible_arm.arm(parts, modes=flexible_arm.BENDING)
-    made = ff.generate_fmu(system, folder / "arm.fmu", fmi=3, step=1e-4)
+    made = ff.design.generate_fmu(system, folder / "arm.fmu", fmi=3, step=1e-4)
     torques = {"shoulder": 1.0, "elbow": -0.3}
     forces = {f"{name}.angle.force": torque for name, torque in torques.items()}
     values = states_at_the_end(made, "CoSimulation", start_values=forces)
     motors = [ff.JointForce(f"motor {name}", name, "angle", preload=torque) for name, torque in torques.items()]
-    motion = ff.integrate(replace(system, forces=motors), ff.trapezoidal(), T_END, 1e-4, formulation="relative")
-    z = ff.relative_model(system).positions(motion.state(-1))[0]
+    motion = ff.integrate(
+        replace(system, forces=motors), ff.integrators.trapezoidal(), T_END, 1e-4, formulation="relative"
+    )
+    z = ff.analyses.relative_model(system).positions(motion.state(-1))[0]
     sizes = np.array([1.0, 1e-3, 1e-4, 1.0, 1e-3, 1e-4])  # of hinges and modes
     assert (np.abs(values[: len(z)] - z) < 2e-3 * sizes).all()
     with pytest.raises(ModelError, match=r"step: 0.001 s is too long for the fastest mode.*expected .* s or less"):
-        ff.generate_fmu(flexible_arm.arm(parts), folder / "stiff.fmu", step=1e-3)
+        ff.design.generate_fmu(flexible_arm.arm(parts), folder / "stiff.fmu", step=1e-3)
 
 
 def test_steps_follow_the_springs_and_dampers_of_joints(robot, folder):
@@ -198,14 +200,14 @@ def test_steps_follow_the_springs_and_dampers_of_joints(robot, folder):
     pin = ff.RevoluteJoint("pin", ff.GROUND, ff.Marker("stick"), axis=(0, 1, 0))
     spring = ff.JointForce("spring", "pin", "angle", stiffness=0.5e6, free=0.1)  # 1000 rad/s
     system = ff.System([stick], [pin], [spring], name="stick")
-    made = ff.generate_fmu(system, folder / "stick.fmu", step=2.5e-3)
+    made = ff.design.generate_fmu(system, folder / "stick.fmu", step=2.5e-3)
     angle = states_at_the_end(made, "CoSimulation", output_interval=T_END)[0]
     assert abs(angle) < 0.3
     with pytest.raises(ModelError, match=r"fastest mode, 1000 rad/s; expected 0.0023 s or less"):
-        ff.generate_fmu(system, folder / "stiff.fmu", step=3e-3)
+        ff.design.generate_fmu(system, folder / "stiff.fmu", step=3e-3)
     damped = replace(system, forces=[replace(spring, stiffness=0.0, damping=500.0)])  # exp(-1000 t)
     with pytest.raises(ModelError, match=r"too long for the fastest mode, 1000 rad/s"):
-        ff.generate_fmu(damped, folder / "stiff.fmu", step=3e-3)
+        ff.design.generate_fmu(damped, folder / "stiff.fmu", step=3e-3)
 
 
 def test_dependencies_are_those_of_the_equations(folder):
@@ -215,7 +217,7 @@ def test_dependencies_are_those_of_the_equations(folder):
     rail = ff.PrismaticJoint("rail", ff.Marker("ground"), ff.Marker("cart"), axis=(1, 0, 0))
     pin = ff.RevoluteJoint("pin", ff.Marker("cart"), ff.Marker("bob", position=(0, 0, 1)), axis=(0, 1, 0))
     system = ff.System([cart, bob], [rail, pin], [ff.Gravity((0, 0, -9.81))], name="cart")
-    made = ff.generate_fmu(system, folder / "cart.fmu")
+    made = ff.design.generate_fmu(system, folder / "cart.fmu")
     described = fmpy.read_model_description(str(made.path))
     found = {each.variable.name: {v.name for v in each.dependencies} for each in described.derivatives}
     assert found["der(rail.distance.value)"] == {"rail.distance.rate"}
@@ -227,7 +229,7 @@ def test_dependencies_are_those_of_the_equations(folder):
 
 
 def test_it_goes_back_to_states_that_were_kept_and_refuses_what_cannot_be(robot, folder):
-    one = Instance(ff.generate_fmu(robot.system, folder / "kept.fmu").path, FMU2Slave)
+    one = Instance(ff.design.generate_fmu(robot.system, folder / "kept.fmu").path, FMU2Slave)
     one.unit.exitInitializationMode()
     names = ["joint1.angle.value", "joint2.angle.value", "time"]
     one.set(["joint1.angle.force"], [5.0])
@@ -274,7 +276,7 @@ def test_its_sources_agree_with_the_headers_of_the_standard_without_a_warning(un
 
 
 def test_the_same_system_makes_the_same_bytes(robot, folder):
-    one, two = (ff.generate_fmu(robot.system, folder / name) for name in ("one.fmu", "two.fmu"))
+    one, two = (ff.design.generate_fmu(robot.system, folder / name) for name in ("one.fmu", "two.fmu"))
     assert one.path.read_bytes() == two.path.read_bytes()
 
 
@@ -292,21 +294,21 @@ def test_the_same_system_makes_the_same_bytes(robot, folder):
 def test_what_cannot_be_is_told(robot, tmp_path, options, message):
     path = tmp_path / options.pop("path", "robot.fmu")
     with pytest.raises(ModelError, match=message):
-        ff.generate_fmu(robot.system, path, **options)
+        ff.design.generate_fmu(robot.system, path, **options)
     assert not list(tmp_path.iterdir())
 
 
 def test_prescribed_coordinates_are_refused(robot, tmp_path):
     joints = [replace(robot.system.joints[0], motions={"angle": harmonic(1.0, 1.0)}), *robot.system.joints[1:]]
     with pytest.raises(ModelError, match=r"coordinate 'joint1/angle' is prescribed by a function of time"):
-        ff.generate_fmu(replace(robot.system, joints=joints), tmp_path / "robot.fmu")
+        ff.design.generate_fmu(replace(robot.system, joints=joints), tmp_path / "robot.fmu")
     assert not list(tmp_path.iterdir())
 
 
 def test_events_are_refused(robot, tmp_path):
-    event = ff.Event("end", "joint1.angle", 1.0, stop=True)
+    event = ff.simulation.Event("end", "joint1.angle", 1.0, stop=True)
     with pytest.raises(ModelError, match=r"got event 'end', which the unit cannot represent; remove it"):
-        ff.generate_fmu(replace(robot.system, events=[event]), tmp_path / "robot.fmu")
+        ff.design.generate_fmu(replace(robot.system, events=[event]), tmp_path / "robot.fmu")
     assert not list(tmp_path.iterdir())
 
 
@@ -317,7 +319,7 @@ def test_events_are_refused(robot, tmp_path):
 def test_a_compiler_that_is_not_there_or_fails_is_told(robot, tmp_path, monkeypatch, compiler, message):
     monkeypatch.setenv("CC", compiler)
     with pytest.raises(ModelError, match=message):
-        ff.generate_fmu(robot.system, tmp_path / "robot.fmu")
+        ff.design.generate_fmu(robot.system, tmp_path / "robot.fmu")
     assert not list(tmp_path.iterdir())
 
 
@@ -349,7 +351,7 @@ def test_the_command_writes_one(tmp_path):
 
 
 def test_each_of_two_units_beside_a_system_tells_its_own_words_also_when_the_other_has_gone(robot, folder):
-    path = ff.generate_fmu(robot.system, folder / "told.fmu").path
+    path = ff.design.generate_fmu(robot.system, folder / "told.fmu").path
     torque = "joint1.angle.force"
     first, second = (ForeignSlave(ForeignUnit(name, str(path), {torque: "sensor"}), 1.0) for name in ("one", "two"))
     for each in (first, second):

@@ -37,7 +37,7 @@ def part():
 
 @pytest.fixture(scope="module", params=[None, cms.NodalFrame("left")], ids=["mean axes", "nodal frame"])
 def reduced(part, request):
-    modes = cms.guyan(part)  # all there are: the span is that of the matrices
+    modes = cms.modes.guyan(part)  # all there are: the span is that of the matrices
     return cms.reduce(part, modes, frame=request.param)
 
 
@@ -92,7 +92,7 @@ def test_a_force_on_massless_shapes_gives_the_response_of_the_full_matrices():
     mesh = LineMesh(nodes, np.array([[0, 1], [1, 2], [2, 3], [3, 4]]))
     ends = [Interface(name, "nodes", np.array([k]), mesh.nodes[k]) for name, k in (("foot", 0), ("top", 4))]
     masses = [PointMass(k, 0.3 + 0.1 * k) for k in range(5)]
-    property_ = fm.BeamProperty(fm.Rectangle(0.02, 0.03), fm.Material("light", 7e10, 0.3, 0.0))
+    property_ = fm.beams.BeamProperty(fm.beams.Rectangle(0.02, 0.03), fm.Material("light", 7e10, 0.3, 0.0))
     part = cms.couple(fm.beam_body(mesh, property_, name="mast", units=UNITS, interfaces=ends, point_masses=masses))
     body = cms.reduce(part, cms.craig_bampton(part, 9), damping=None)
     seen = [Observed("top", interface="top", quantities=("displacement", "acceleration"))]
@@ -207,7 +207,7 @@ def test_an_amplification_is_that_of_a_mass_at_its_frequency():
 
 def test_own_damping_of_the_body_couples_its_modes_and_changes_the_response():
     part = cms.couple(beam(n=3))
-    body = cms.reduce(part, cms.craig_bampton(part, n_modes=12), damping=cms.ModalDamping(0.02))
+    body = cms.reduce(part, cms.craig_bampton(part, n_modes=12), damping=cms.reduction.ModalDamping(0.02))
     model = shaken_body(body, bases_of_body(body, "left"), Damping(own=True), [Observed("tip", interface="right")])
     assert not model.is_modal
     M, C, K = np.eye(len(model.omega)), model.C, np.diag(model.omega**2)
@@ -229,7 +229,7 @@ def test_own_damping_acts_through_two_bases_that_move_against_each_other(part):
     """Oracle: the whole pencil of the free body, both bases held by rows of their own, no elimination."""
     from cms.assessment.quality.reference.free_pencil import whole_pencil, whole_port_rows
 
-    body = cms.reduce(part, cms.guyan(part), damping=cms.ModalDamping(0.2))
+    body = cms.reduce(part, cms.modes.guyan(part), damping=cms.reduction.ModalDamping(0.2))
     bases = bases_of_body(body, {"a": ("left",), "b": ("right",)}, {"a": P})
     middle = Observed("middle", interface="first", quantities=("acceleration", "displacement"))
     model = shaken_body(body, bases, Damping(own=True), [middle])
@@ -278,12 +278,12 @@ def test_stress_and_places_of_a_solid(solid):
 
 def test_rows_of_a_recovery_table_are_the_outputs_of_the_same_places(part):
     rows = (
-        cms.Rows("acceleration", at=("right",)),
-        cms.Rows("displacement", at=("right",)),
-        cms.Rows("net force", about=(0.0, 0.0, 0.0)),
+        cms.reduction.Rows("acceleration", at=("right",)),
+        cms.reduction.Rows("displacement", at=("right",)),
+        cms.reduction.Rows("net force", about=(0.0, 0.0, 0.0)),
     )
-    request = cms.RecoveryRequest("table", rows=rows)  # of all modes there are: no static rest beside them
-    body = cms.reduce(part, cms.guyan(part), recovery=[request])
+    request = cms.reduction.RecoveryRequest("table", rows=rows)  # of all modes there are: no static rest beside them
+    body = cms.reduce(part, cms.modes.guyan(part), recovery=[request])
     seen = [
         Observed("tip", interface="right", quantities=("acceleration", "displacement")),
         Observed("t", recovery="table"),
@@ -338,7 +338,7 @@ def test_bases_that_do_not_exist_are_refused(solid, bases, words):
 
 def test_a_body_whose_modes_cannot_follow_two_bases_is_refused():
     part = cms.couple(bar(nx=3))
-    body = cms.reduce(part, cms.normal_modes(part, n_modes=4))
+    body = cms.reduce(part, cms.modes.normal_modes(part, n_modes=4))
     with pytest.raises(ModelError, match="cannot follow motions of the bases against each other"):
         shaken_body(body, bases_of_body(body, {"a": ("left",), "b": ("right",)}), Damping(ratio=0.01))
 

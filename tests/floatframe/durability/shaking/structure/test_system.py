@@ -27,7 +27,7 @@ F = np.array([1.0, 8.0, 31.0, 90.0, 400.0])
 def rod():
     part = cms.couple(beam(n=3))
     return cms.reduce(
-        part, cms.craig_bampton(part, n_modes=6), frame=cms.NodalFrame("left"), damping=cms.ModalDamping(0.03)
+        part, cms.craig_bampton(part, n_modes=6), frame=cms.NodalFrame("left"), damping=cms.reduction.ModalDamping(0.03)
     )
 
 
@@ -62,7 +62,7 @@ def test_the_force_of_a_base_has_the_damping_of_the_modes_in_every_frame(frame):
     part = cms.couple(beam(n=3))
     body = cms.reduce(part, cms.craig_bampton(part, n_modes=6), frame=frame)
     alone = shaken_body(body, bases_of_body(body, "left"), Damping(Q=5))
-    system = replace(on_ground(body), sensors=[ff.ReactionSensor("load", "foot")])
+    system = replace(on_ground(body), sensors=[ff.sensors.ReactionSensor("load", "foot")])
     model = shaken_system(system, bases_of_system(system, None), Damping(Q=5), [Observed("load", sensor="load")])
     f = alone.omega[:3] / (2 * np.pi)
     force, mass = response(alone, f)[:, :6], float(body.moments.m)
@@ -78,7 +78,7 @@ def test_the_force_of_a_base_has_the_damping_of_the_modes_in_every_frame(frame):
 def test_net_force_of_two_bases_is_the_mass_times_the_acceleration_of_the_whole(rod):
     block = ff.RigidBody("block", 2.0, np.eye(3) * 0.01, position=(1.0, 0.0, 0.0))
     weld = ff.FixedJoint("weld", ff.Marker("rod", "right"), ff.Marker("block"))
-    spring = ff.Bushing(
+    spring = ff.forces.Bushing(
         "spring",
         ff.Marker(ff.GROUND, position=(1.0, 0, 0)),
         ff.Marker("block"),
@@ -117,7 +117,7 @@ def test_a_shock_is_that_of_the_time_integration_of_a_driven_base(rod):
     foot = ff.FixedJoint("foot", ff.Marker("table"), ff.Marker("rod", "left"))
     driven = ff.System([ff.FlexibleBody("rod", rod, stiffening=False), table], [slide, foot])
     motion = ff.integrate(driven, ff.GeneralizedAlpha(rho_inf=0.9), t_end=0.04, h=2e-5, output_every=10)
-    tip = ff.interface_motion(motion, "rod", rod, "right")
+    tip = ff.results.interface_motion(motion, "rod", rod, "right")
     names = [output.name for output in run.outputs]
     mine = run.values[names.index("tip displacement z")]
     base = motion.body("table").r[:, 2]
@@ -130,12 +130,15 @@ def test_a_shock_is_that_of_the_time_integration_of_a_driven_base(rod):
 
 
 def test_the_job_takes_a_system_and_its_sensors(rod):
-    system = replace(on_ground(rod), sensors=[ff.ReactionSensor("load", "foot")])
-    level = ff.Level.of([(5, 1.0), (60, 1.0)])
-    job = ff.ShakeJob(
-        system, damping=Damping(Q=20), outputs=[Observed("load", sensor="load")], sine=[ff.SineTest("s", level, ("z",))]
+    system = replace(on_ground(rod), sensors=[ff.sensors.ReactionSensor("load", "foot")])
+    level = ff.durability.shaking.Level.of([(5, 1.0), (60, 1.0)])
+    job = ff.durability.shaking.ShakeJob(
+        system,
+        damping=Damping(Q=20),
+        outputs=[Observed("load", sensor="load")],
+        sine=[ff.durability.shaking.SineTest("s", level, ("z",))],
     )
-    run = ff.shake(job).sine[0]
+    run = ff.durability.shaking.shake(job).sine[0]
     names = [output.name for output in run.outputs]
     assert_allclose(run.sizes[:, names.index("load force z")], run.sizes[:, names.index("base force z")], rtol=1e-9)
 
@@ -166,12 +169,14 @@ def test_recovery_rows_of_places_count_from_the_first_base(frame, held):
     Static residuals of its rows answer to what the base exerts, in a system without the damping of the modes: 2 zeta of
     a residual of some tenths of a per cent here.
     """
-    mesh = fm.straight_line((0.3, -0.2, 0.1), (0.3, 0.1, 0.9), 6)
-    ends = [fm.line_interface(mesh, n, fm.NodeSet(at)) for n, at in (("foot", "start"), ("tip", "end"))]
-    section = fm.BeamProperty(fm.Rectangle(0.04, 0.03), fm.Material("al", E=70e9, nu=0.33, rho=2700.0))
+    mesh = fm.beams.straight_line((0.3, -0.2, 0.1), (0.3, 0.1, 0.9), 6)
+    ends = [
+        fm.beams.line_interface(mesh, n, fm.selections.NodeSet(at)) for n, at in (("foot", "start"), ("tip", "end"))
+    ]
+    section = fm.beams.BeamProperty(fm.beams.Rectangle(0.04, 0.03), fm.Material("al", E=70e9, nu=0.33, rho=2700.0))
     part = cms.couple(fm.beam_body(mesh, section, name="mast", units=cms.unit_system("m-kg-s"), interfaces=ends))
-    motions = [cms.Rows(kind, ("tip", 3)) for kind in ("displacement", "velocity", "acceleration")]
-    request = cms.RecoveryRequest("t", tuple(motions))
+    motions = [cms.reduction.Rows(kind, ("tip", 3)) for kind in ("displacement", "velocity", "acceleration")]
+    request = cms.reduction.RecoveryRequest("t", tuple(motions))
     body = cms.reduce(part, cms.craig_bampton(part, 6), frame=frame, recovery=request)
     turned = Rotation.from_rotvec([0.4, -0.7, 0.3])
     turn = turned.as_matrix()
@@ -183,7 +188,7 @@ def test_recovery_rows_of_places_count_from_the_first_base(frame, held):
         )
         for name, node in (("foot", 0), ("tip", 6)) if name in held
     ]  # fmt: skip
-    sensor = ff.RecoverySensor("t", "mast", "t")
+    sensor = ff.sensors.RecoverySensor("t", "mast", "t")
     standing = ff.FlexibleBody("mast", body, position=(5.0, 1.0, -2.0), orientation=np.roll(turned.as_quat(), 1))
     system = ff.System([standing], joints, [], units=body.units, sensors=[sensor])
     bases = {name: (f"at {name}",) for name in held}

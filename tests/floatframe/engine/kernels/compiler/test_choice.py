@@ -93,7 +93,7 @@ def test_the_project_sets_no_upper_bound_of_numba():
 
 
 OLDEST = "numba==0.60.*"
-PACKAGES = ("numpy", "scipy", "h5py", "pydantic", "tomlkit", "lazy_loader", "threadpoolctl", "typer", "rich",
+PACKAGES = ("numpy", "scipy", "h5py", "pydantic", "tomlkit", "threadpoolctl", "typer", "rich",
             "scikit-fem", "meshio", "matplotlib", "pytest", "hypothesis")  # fmt: skip
 TESTS = ("tests/floatframe/integrators/test_pendulum.py", "tests/floatframe/engine/kernels/test_arrays.py")
 

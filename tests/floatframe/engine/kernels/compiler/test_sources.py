@@ -209,9 +209,9 @@ MOTION = """
 import numpy as np
 import floatframe as ff
 guide = ff.PrismaticJoint("guide", ff.GROUND, ff.Marker("block"), axis=(1, 0, 0))
-push = ff.UserForce("push", {"x": ff.JointCoordinate("guide", "distance")}, {"x": "1.5 + exp(0 * t)"})
+push = ff.UserForce("push", {"x": ff.joints.JointCoordinate("guide", "distance")}, {"x": "1.5 + exp(0 * t)"})
 system = ff.System([ff.RigidBody("block", 1.0, np.eye(3))], [guide], [push])
-print(f"{ff.integrate(system, ff.trapezoidal(), 2**0.5, 0.1).body('block').r[-1, 0]:.9g}")
+print(f"{ff.integrate(system, ff.integrators.trapezoidal(), 2**0.5, 0.1).body('block').r[-1, 0]:.9g}")
 """
 
 

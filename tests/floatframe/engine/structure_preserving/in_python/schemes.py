@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe import EnergyDecaying, EnergyMomentum, Variational
 from floatframe.engine.structure_preserving.compiled import Filter, filter_of
+from floatframe.integrators import EnergyDecaying, EnergyMomentum, Variational
 from floatframe.model.rotations import cross, dot, rotated
 from tests.floatframe.engine.structure_preserving.in_python.bodies import Body, BodyStep, Placed, moved, step_of, still
 from tests.floatframe.engine.structure_preserving.in_python.constraints import Span

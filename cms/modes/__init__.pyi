@@ -1,0 +1,27 @@
+from cms.linear_algebra.solvers.mode_count import ModeCount as ModeCount
+
+from .centrifugal import centrifugal_loads as centrifugal_loads
+from .families.families import Families as Families
+from .families.interface_loads import InterfaceLoad as InterfaceLoad
+from .families.interface_loads import condensed_load as condensed_load
+from .families.interface_loads import point_load as point_load
+from .mode_sets.assumed import assumed_modes as assumed_modes
+from .mode_sets.balanced import balanced_truncation as balanced_truncation
+from .mode_sets.characteristic_modes import with_characteristic_modes as with_characteristic_modes
+from .mode_sets.classical import attachment as attachment
+from .mode_sets.classical import benfield_hruda as benfield_hruda
+from .mode_sets.classical import craig_bampton_ir as craig_bampton_ir
+from .mode_sets.classical import guyan as guyan
+from .mode_sets.classical import unrestrained_attachment as unrestrained_attachment
+from .mode_sets.extra_columns import with_centrifugal as with_centrifugal
+from .mode_sets.extra_columns import with_load_cases as with_load_cases
+from .mode_sets.free_interface import craig_chang as craig_chang
+from .mode_sets.free_interface import dual_craig_bampton as dual_craig_bampton
+from .mode_sets.free_interface import herting as herting
+from .mode_sets.free_interface import macneal as macneal
+from .mode_sets.free_interface import normal_modes as normal_modes
+from .mode_sets.given_columns import user_basis as user_basis
+from .mode_sets.krylov import krylov as krylov
+from .mode_sets.mesh_field import CoupledField as CoupledField
+from .mode_sets.mesh_field import coupled_field as coupled_field
+from .mode_sets.multilevel import multilevel as multilevel

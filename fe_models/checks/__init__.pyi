@@ -1,0 +1,2 @@
+from .mesh_report import MeshReport as MeshReport
+from .report import Finding as Finding

@@ -1,0 +1,10 @@
+from .boundary import boundary_facets as boundary_facets
+from .boundary import boundary_triangles as boundary_triangles
+from .mesh import drop_unused_nodes as drop_unused_nodes
+from .node_cloud import NodeCloud as NodeCloud
+from .numbering import NamedSet as NamedSet
+from .numbering import Numbering as Numbering
+from .objects.as_mesh import as_mesh as as_mesh
+from .split import Cut as Cut
+from .split import Split as Split
+from .split import split_mesh as split_mesh

@@ -1,0 +1,16 @@
+from .checks.shell_report import ShellReport as ShellReport
+from .checks.shell_report import report_shell as report_shell
+from .elements.shells.body import shell_interface as shell_interface
+from .elements.shells.normals import orient_normals as orient_normals
+from .elements.shells.shell_points import layer_stress as layer_stress
+from .elements.shells.shell_points import shell_points as shell_points
+from .elements.shells.shell_property import LaminateProperty as LaminateProperty
+from .elements.shells.shell_property import Layer as Layer
+from .elements.shells.shell_property import ShellProperty as ShellProperty
+from .elements.shells.shell_property import StiffnessProperty as StiffnessProperty
+from .elements.shells.shell_property import symmetric as symmetric
+from .files.read_mesh import read_shell_mesh as read_shell_mesh
+from .meshes.objects.as_mesh import as_shell_mesh as as_shell_mesh
+from .meshes.shell_mesh import ShellMesh as ShellMesh
+from .meshes.shell_mesh import flat_plate as flat_plate
+from .meshes.shell_mesh import mapped_shell as mapped_shell

@@ -1,0 +1,15 @@
+from . import aerodynamics as aerodynamics
+from . import bearings as bearings
+from . import cables as cables
+from . import clearances as clearances
+from . import drives as drives
+from . import friction as friction
+from . import hydraulics as hydraulics
+from . import mechanisms as mechanisms
+from . import rails as rails
+from . import wheels as wheels
+from .flexible_parts.exact_beams import exact_beams as exact_beams
+from .flexible_parts.finite_segments import finite_segments as finite_segments
+from .flexible_parts.finite_segments import floating_parts as floating_parts
+from .flexible_parts.flexible_part import FlexiblePart as FlexiblePart
+from .flexible_parts.superelement import corotational as corotational

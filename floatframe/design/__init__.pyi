@@ -1,0 +1,11 @@
+from . import identification as identification
+from . import laboratory as laboratory
+from .generation.generate import GeneratedCode as GeneratedCode
+from .generation.generate import generate as generate
+from .generation.units.generated_unit import generate_fmu as generate_fmu
+from .gradients.sensitivities import Sensitivities as Sensitivities
+from .gradients.sensitivities import sensitivities as sensitivities
+from .optimization.design_file import read_design as read_design
+from .optimization.optimize import optimize as optimize
+from .studies.study import run_study as run_study
+from .studies.study_file import read_study as read_study

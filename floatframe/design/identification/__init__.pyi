@@ -1,0 +1,15 @@
+from .barycentric import barycentric_parameters as barycentric_parameters
+from .base_parameters import base_parameters as base_parameters
+from .estimation import Measured as Measured
+from .estimation import estimate as estimate
+from .excitation import ExcitingMotion as ExcitingMotion
+from .excitation import MotionLimits as MotionLimits
+from .excitation import exciting_motion as exciting_motion
+from .output_error import MeasuredOutputs as MeasuredOutputs
+from .output_error import OutputFit as OutputFit
+from .output_error import computed_outputs as computed_outputs
+from .output_error import fit_outputs as fit_outputs
+from .physical import real_parameters as real_parameters
+from .regressors import linear_form as linear_form
+from .scaled_link import scaled_link as scaled_link
+from .tree_samples import tree_samples as tree_samples

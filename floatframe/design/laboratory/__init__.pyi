@@ -1,0 +1,10 @@
+from .cases import Case as Case
+from .cases import grid as grid
+from .exact_beam import ExactBeam as ExactBeam
+from .full_model import FullModel as FullModel
+from .full_transient import FrameAcceleration as FrameAcceleration
+from .full_transient import FullTransient as FullTransient
+from .full_transient import full_transient as full_transient
+from .laboratory import LaboratoryResult as LaboratoryResult
+from .laboratory import Reference as Reference
+from .laboratory import study as study

@@ -1,0 +1,2 @@
+from . import fatigue as fatigue
+from . import shaking as shaking

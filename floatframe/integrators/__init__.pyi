@@ -1,0 +1,9 @@
+from .energy_momentum import EnergyDecaying as EnergyDecaying
+from .energy_momentum import EnergyMomentum as EnergyMomentum
+from .generalized_alpha import hht as hht
+from .generalized_alpha import newmark as newmark
+from .generalized_alpha import trapezoidal as trapezoidal
+from .ida import Ida as Ida
+from .relative import RelativeGeneralizedAlpha as RelativeGeneralizedAlpha
+from .relative_ode import RelativeOde as RelativeOde
+from .variational import Variational as Variational

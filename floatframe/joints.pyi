@@ -1,0 +1,17 @@
+from .model.bodies.coordinates import AxialAngle as AxialAngle
+from .model.bodies.coordinates import AxialDistance as AxialDistance
+from .model.bodies.coordinates import JointCoordinate as JointCoordinate
+from .model.bodies.coordinates import PointDistance as PointDistance
+from .model.joints.coordinate_coupler import CoordinateCoupler as CoordinateCoupler
+from .model.joints.coordinate_coupler import Limits as Limits
+from .model.joints.lower_pairs import CylindricalJoint as CylindricalJoint
+from .model.joints.lower_pairs import PlanarJoint as PlanarJoint
+from .model.joints.lower_pairs import ScrewJoint as ScrewJoint
+from .model.joints.orientation_joints import ConstantOrientation as ConstantOrientation
+from .model.joints.orientation_joints import ConstantVelocityJoint as ConstantVelocityJoint
+from .model.joints.orientation_joints import UniversalJoint as UniversalJoint
+from .model.joints.point_joints import DistanceJoint as DistanceJoint
+from .model.joints.point_joints import PointOnLine as PointOnLine
+from .model.joints.point_joints import PointOnPlane as PointOnPlane
+from .model.joints.rolling_disc import RollingDisc as RollingDisc
+from .model.joints.sliding import SlidingJoint as SlidingJoint
