@@ -174,7 +174,7 @@ class CompiledEntry:
         """Carry out a request; fields that are not given are zero, and all arrays stay alive until it returns."""
         if not self.is_ready:
             misses = self.cache_misses
-            announcement = Timer(PATIENCE, lambda: self.cache_misses > misses and announce())
+            announcement = Timer(PATIENCE, lambda: announce() if self.cache_misses > misses else None)
             announcement.daemon = True
             announcement.start()
             try:
