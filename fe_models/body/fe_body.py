@@ -13,8 +13,10 @@ from fe_models.body.rigid_motion import MassLoads
 from fe_models.errors import InterfaceError
 from fe_models.foundation.arrays import (
     Array,
+    GivenArray,
     IntArray,
     frozen,
+    given,
     require_finite,
     require_shape,
     symmetric_csc,
@@ -197,8 +199,8 @@ class Interface:
     name: str
     kind: str
     nodes: IntArray
-    reference: Array
-    triad: Array = field(default_factory=lambda: np.eye(3))
+    reference: GivenArray = given()
+    triad: GivenArray = given(np.eye(3))
     weights: Array | None = None
     dofs: IntArray | None = None
 

@@ -1,10 +1,11 @@
 """Arrays of the frozen types: float64, C order, finite, read-only; names of their components."""
 
-from typing import Any, overload
+from dataclasses import field
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from fe_models.foundation.errors import BodyError
 
@@ -12,9 +13,12 @@ __all__ = [
     "MOTION_COMPONENTS",
     "STRESS_COMPONENTS",
     "Array",
+    "GivenArray",
+    "GivenArrayOrNone",
     "IntArray",
     "axial",
     "frozen",
+    "given",
     "require_finite",
     "require_shape",
     "symmetric_csc",
@@ -23,6 +27,33 @@ __all__ = [
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+
+# Types of the fields of records that take lists, tuples or arrays and hold arrays. A type checker learns both from the
+# two methods. It takes them into account only for fields with a value, so required fields are written `= given()`.
+if TYPE_CHECKING:
+
+    class GivenArray:
+        """A field that takes anything array-like and holds an array."""
+
+        def __get__(self, record: object, kind: object = None) -> Array: ...
+        def __set__(self, record: object, value: ArrayLike) -> None: ...
+
+    class GivenArrayOrNone:
+        """The same, or None."""
+
+        def __get__(self, record: object, kind: object = None) -> Array | None: ...
+        def __set__(self, record: object, value: ArrayLike | None) -> None: ...
+
+else:
+    GivenArray, GivenArrayOrNone = Array, Array | None
+
+
+def given(*default: ArrayLike | None) -> Any:
+    """Return the field of a record of the type `GivenArray` or `GivenArrayOrNone`, with its default if it has one."""
+    if not default or default[0] is None:
+        return field(default=None) if default else field()
+    return field(default_factory=lambda: np.array(default[0], dtype=np.float64))
+
 
 #: components of a node or interface: translations, then rotations; component k of `FEBody.dofs`
 MOTION_COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz")

@@ -19,7 +19,7 @@ import numpy as np
 import scipy.linalg as la
 from scipy.optimize import nnls
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, GivenArrayOrNone, given
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import nearest, quoted
@@ -76,7 +76,7 @@ class Target:
 
     marker: Marker
     position: Array | Sequence[float] | None = None
-    rotation: Array | None = None
+    rotation: GivenArrayOrNone = given(None)
     weight: float = 1.0
 
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
@@ -61,7 +61,7 @@ class BristleFriction(Element):
     creeps: bool = False  #: whether the bristles slip at any deflection (LuGre as published)
     motion: str = "along"  #: motion "along" the axis or "about" it
     speed: float = 0.0  #: initial sliding velocity, with the bristle deflection of steady sliding
-    axis: Array = (0.0, 0.0, 1.0)  # type: ignore[assignment]  #: in the axes of marker a, (3,)
+    axis: GivenArray = given((0.0, 0.0, 1.0))  #: in the axes of marker a, (3,)
 
     def __post_init__(self) -> None:
         where = f"element {self.name!r}"

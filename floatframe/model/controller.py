@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array, frozen
+from fe_models.foundation.arrays import Array, GivenArrayOrNone, frozen, given
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import ModelError
@@ -62,7 +62,7 @@ class Controller:
     inputs: Sequence[str]
     outputs: Sequence[str]
     function: Callable[..., Any]
-    state: Array | None = None
+    state: GivenArrayOrNone = given(None)
 
     def __post_init__(self) -> None:
         where = f"controller {self.name!r}"
@@ -115,9 +115,9 @@ class Controller:
                 "control.sample_system(model, 1e-3)"
             )
         A, B, C, D = (np.atleast_2d(np.asarray(getattr(model, part), dtype=float)) for part in "ABCD")
-        for part, words, given in ((inputs, "inputs", B.shape[1]), (outputs, "outputs", C.shape[0])):
-            if not isinstance(part, str) and len(part) != given:
-                raise ModelError(f"{where}: {words}: the model has {given}, got {len(part)}")
+        for part, words, n in ((inputs, "inputs", B.shape[1]), (outputs, "outputs", C.shape[0])):
+            if not isinstance(part, str) and len(part) != n:
+                raise ModelError(f"{where}: {words}: the model has {n}, got {len(part)}")
         z = np.zeros(len(A)) if state is None else np.asarray(state, dtype=float)
         if z.shape != (len(A),):
             raise ModelError(f"{where}: state: expected {len(A)} numbers, got shape {z.shape}")

@@ -3,6 +3,7 @@
 import re
 from dataclasses import fields, is_dataclass
 
+import mypy.api
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -94,6 +95,15 @@ def test_a_stiff_rod_swings_with_the_period_of_the_compound_pendulum(reduced):
     lowest = rod.t[k - 1] + (rod.t[k] - rod.t[k - 1]) * along[k - 1] / (along[k - 1] - along[k])
     assert_allclose(lowest, quarter, rtol=2e-5)
     assert_allclose(np.abs(rod.omega_B[k, 1]), np.sqrt(2 * moments.m * GRAVITY * s / J), rtol=1e-4)
+
+
+def test_type_checkers_accept_the_python_example(tmp_path):
+    """Tuples and lists where a field holds an array; a wrong kind is still seen."""
+    block = re.search(r"<!-- python -->\n```python\n(.*?)```", README.read_text(), re.DOTALL)
+    (tmp_path / "example.py").write_text(block[1] + "ff.Gravity(acceleration=pin)\n")
+    told = mypy.api.run([str(tmp_path / "example.py"), "--config-file", str(ROOT / "pyproject.toml")])[0].splitlines()
+    assert len(told) == 2, told
+    assert 'Argument "acceleration" to "Gravity" has incompatible type "RevoluteJoint"' in told[0]
 
 
 def test_python_example_of_the_readme_runs(tmp_path, monkeypatch, capsys):

@@ -10,12 +10,12 @@ With the value s of the input, each type enters the equations of `system_matrice
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
@@ -105,9 +105,9 @@ class BaseMotion:
     """
 
     name: str
-    direction: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))
+    direction: GivenArray = given((1.0, 0.0, 0.0))
     quantity: str = "translation"
-    about: Array = field(default_factory=lambda: np.zeros(3))
+    about: GivenArray = given(np.zeros(3))
     joints: Sequence[str] | None = None
     rate: int = 2
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from numba import njit
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.units import SPEED, Quantity
 from floatframe.components.clearances.contact import (
@@ -125,7 +125,7 @@ class Backlash(Element):
     exponent: float = 1.0  #: exponent n of the contact depth
     damping: float = 0.0  #: damping chi, proportional to the approach velocity [s/m, s/rad]
     motion: str = "along"  #: motion "along" the axis or "about" it
-    axis: Array = (0.0, 0.0, 1.0)  # type: ignore[assignment]  #: in the axes of marker a, (3,)
+    axis: GivenArray = given((0.0, 0.0, 1.0))  #: in the axes of marker a, (3,)
 
     def __post_init__(self) -> None:
         where = f"element {self.name!r}"

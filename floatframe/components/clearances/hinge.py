@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.units import SPEED, Quantity
 from floatframe.components.clearances.contact import (
@@ -85,7 +85,7 @@ class HingeWithPlay(Element):
     turn_damping: float = 0.0  #: torsional damping d_t about the axis [N m s/rad]
     #: angle at which the torsional spring is free of moment, relative to the assembled angle [rad]
     turn_free: float = 0.0
-    axis: Array = (0.0, 0.0, 1.0)  # type: ignore[assignment]  #: in the axes of marker a, (3,)
+    axis: GivenArray = given((0.0, 0.0, 1.0))  #: in the axes of marker a, (3,)
 
     def __post_init__(self) -> None:
         require_numbers(

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.units import RATE, TIME, Quantity
 from floatframe.components.drives.shaft import check_shaft, required, time_functions
@@ -76,7 +76,7 @@ class AntiSkidBrake(Element):
     friction_speed: float = FRICTION_SPEED  #: speed scale of the disc friction [rad/s]; a locked wheel creeps below it
     speed: float = 0.0  #: initial speed of the wheel [rad/s]
     anti_skid: bool = True
-    axis: Array = Y_AXIS  # type: ignore[assignment]  #: in the axes of marker a, (3,)
+    axis: GivenArray = given(Y_AXIS)  #: in the axes of marker a, (3,)
 
     def __post_init__(self) -> None:
         where = f"element {self.name!r}"

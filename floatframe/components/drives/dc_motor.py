@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.units import RATE, Quantity
 from floatframe.components.drives.pid import Pid, pid_law
@@ -66,7 +66,7 @@ class DcMotor(Element):
     voltage: TimeFunction | float | None = None  #: voltage u as a function of time [V]
     controller: Pid | None = None  #: controller of u, in place of `voltage`
     controlled: str = "speed"  #: quantity that the controller controls: "speed", "angle" or "current"
-    axis: Array = Z_AXIS  #: axis in axes of marker a, (3,)
+    axis: GivenArray = given(Z_AXIS)  #: axis in axes of marker a, (3,)
     ratio: float = 1.0  #: gear ratio, speed of the motor divided by omega
     friction: float = 0.0  #: dry friction of the motor [N m]
     friction_speed: float = FRICTION_SPEED  #: speed scale w of friction ω/√(ω² + w²), with motor speed ω [rad/s]

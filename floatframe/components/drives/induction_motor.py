@@ -19,7 +19,7 @@ from math import pi
 import numpy as np
 from numba import njit
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.components.drives.shaft import Z_AXIS, check_shaft, required, shaft_numbers, time_functions
 from floatframe.errors import ModelError
@@ -74,7 +74,7 @@ class InductionMotor(Element):
     rated_frequency: float | None = None  #: rated frequency, for constant V/f [Hz]
     boost: float = 0.0  #: voltage amplitude at standstill, for constant V/f [V]
     harmonics: Sequence[Sequence[float]] = ()  #: order of each harmonic, and its amplitude relative to the fundamental
-    axis: Array = Z_AXIS  #: axis in axes of marker a, (3,)
+    axis: GivenArray = given(Z_AXIS)  #: axis in axes of marker a, (3,)
     ratio: float = 1.0  #: gear ratio, speed of the motor divided by the speed of b
     damping: float = 0.0  #: viscous damping of the motor: torque divided by speed [N m s]
     fluxes: Sequence[float] = (0.0, 0.0, 0.0, 0.0)  #: initial flux linkages of stator a, b and rotor a, b [V s]

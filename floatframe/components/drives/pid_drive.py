@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from numba import njit
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.components.drives.pid import Pid, pid_law, target_of
 from floatframe.components.drives.shaft import Z_AXIS, check_controller, check_shaft, required, shaft_numbers
@@ -39,7 +39,7 @@ class PidDrive(Element):
     marker_b: Marker
     controller: Pid
     controlled: str = "angle"
-    axis: Array = Z_AXIS  #: axis in axes of marker a, (3,)
+    axis: GivenArray = given(Z_AXIS)  #: axis in axes of marker a, (3,)
     time_constant: float = 0.0  #: time constant of the actuator [s]
 
     def __post_init__(self) -> None:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from numba import njit
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.components.drives.shaft import Z_AXIS, check_shaft, required, time_functions
 from floatframe.errors import ModelError
@@ -38,7 +38,7 @@ class SpeedControl(Element):
     rate_time: float = 0.0  #: rate time lambda [s]
     #: time constant of the filter, required with lambda; usually at most lambda/10 [s]
     filter_time: float | None = None
-    axis: Array = Z_AXIS  #: axis in axes of marker a, (3,)
+    axis: GivenArray = given(Z_AXIS)  #: axis in axes of marker a, (3,)
     limit: float | None = None  #: largest torque in both directions [N m]; None: no limit
     speed: float = 0.0  #: initial speed omega, from which the filter starts [rad/s]
 

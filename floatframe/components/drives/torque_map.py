@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from numba import njit
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.components.drives.pid import Pid, pid_law
 from floatframe.components.drives.shaft import Z_AXIS, check_controller, check_shaft, required, time_functions
@@ -48,7 +48,7 @@ class TorqueMap(Element):
     controller: Pid | None = None  #: controller of the throttle from the speed of b, in place of `throttle`
     time_constant: float = 0.0  #: time constant of the torque lag [s]
     ratio: float = 1.0  #: gear ratio, speed of the motor divided by the speed of b
-    axis: Array = Z_AXIS  #: axis in axes of marker a, (3,)
+    axis: GivenArray = given(Z_AXIS)  #: axis in axes of marker a, (3,)
     efficiency_torques: Sequence[float] | None = None  #: increasing absolute motor torques of the efficiency map [N m]
     #: efficiencies, with a row for each of `speeds` and a column for each torque
     efficiencies: Sequence[Sequence[float]] | None = None

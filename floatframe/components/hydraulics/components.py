@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Any
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.units import SPEED, Quantity
 from floatframe.errors import ModelError
@@ -291,7 +291,7 @@ class Pump:
     marker_a: Marker  #: marker on the housing
     marker_b: Marker  #: marker on the shaft
     displacement: float  #: displaced volume per radian [m³]
-    axis: Array = (0.0, 0.0, 1.0)  # type: ignore[assignment]  #: in axes of marker a, (3,)
+    axis: GivenArray = given((0.0, 0.0, 1.0))  #: in axes of marker a, (3,)
     leakage: float = 0.0  #: leakage from a to b, flow divided by pressure difference [m³/(s Pa)]
     drag: float = 0.0  #: drag torque divided by speed [N m s]
 

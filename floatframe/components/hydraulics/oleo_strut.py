@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.units import SPEED, Quantity
 from floatframe.components.hydraulics.fluid import Fluid
@@ -80,7 +80,7 @@ class OleoStrut(Element):
     friction_area: float = 0.0  #: additional friction of the seals divided by the gas pressure [m²]
     friction_speed: float = FRICTION_SPEED  #: speed scale of the seal friction [m/s]
     stop_damping: float = 0.0  #: damping d of the stops [s/m]
-    axis: Array = Z_AXIS  #: direction from marker a to marker b, in the axes of marker a, (3,)
+    axis: GivenArray = given(Z_AXIS)  #: direction from marker a to marker b, in the axes of marker a, (3,)
 
     def __post_init__(self) -> None:
         where = f"element {self.name!r}"

@@ -7,13 +7,13 @@ its end, the track is straight.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.components.rails.irregularities import Irregularities
 from floatframe.errors import ModelError
@@ -89,9 +89,7 @@ class Track:
 
     segments: Sequence[Segment] = ()  #: segments in order; none: an infinite straight track
     irregularities: Irregularities | None = None
-    start: Array = field(
-        default_factory=lambda: np.zeros(3)
-    )  #: of the centre line, height of the tops of the rails [m]
+    start: GivenArray = given(np.zeros(3))  #: of the centre line, height of the tops of the rails [m]
     heading: float = 0.0  #: direction relative to the x axis of the ground, to the left [rad]
 
     def __post_init__(self) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.units import SPEED, TIME, Quantity
 from floatframe.components.wheels.contact import (
@@ -137,7 +137,7 @@ class LinearTyre(Element):
     settling_time: float = SETTLING_TIME  #: settling time tau of the damped tread at a standstill [s]
     landing_depth: float | None = None  #: deflection over which damping and tread forces build up [m]; None: radius/500
     #: spin axis, pointing left, in axes of marker B
-    axis: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))
+    axis: GivenArray = given((0.0, 1.0, 0.0))
     road: Road = field(default_factory=FlatRoad)  #: road in axes of marker A
 
     def __post_init__(self) -> None:

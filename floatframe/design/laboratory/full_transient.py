@@ -15,7 +15,7 @@ softening, geometric stiffness), so that omega must be well below the lowest fre
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -30,7 +30,7 @@ from cms.reduction.basis.damping import RayleighDamping
 from cms.reduction.geometric_stiffness.unit_states import has_geometric_stiffness, unit_mass_loads
 from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.body.rigid_motion import MassLoads, rigid_motion_of_dofs
-from fe_models.foundation.arrays import Array, IntArray, frozen
+from fe_models.foundation.arrays import Array, GivenArray, IntArray, frozen, given
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from floatframe.errors import ModelError
@@ -57,10 +57,10 @@ class FrameAcceleration:
         Reference point in mesh coordinates, (3,) [m].
     """
 
-    acceleration: Array
-    omega: Array
-    alpha: Array
-    origin: Array = field(default_factory=lambda: np.zeros(3))
+    acceleration: GivenArray = given()
+    omega: GivenArray = given()
+    alpha: GivenArray = given()
+    origin: GivenArray = given(np.zeros(3))
 
 
 @presented
@@ -299,8 +299,8 @@ def load_columns(
     if unknown:
         raise ModelError(f"{where}: no load case {', '.join(unknown)}; it has {', '.join(cases) or 'none'}")
     columns += [np.asarray(cases[name])[:, None] for name in loads]
-    for name, given, width in (*((n, g, 6) for n, g in wrenches.items()), *((n, g, 1) for n, g in loads.items())):
-        values = np.asarray(given, dtype=float).reshape(len(given), -1)
+    for name, table, width in (*((n, g, 6) for n, g in wrenches.items()), *((n, g, 1) for n, g in loads.items())):
+        values = np.asarray(table, dtype=float).reshape(len(table), -1)
         if values.shape != (len(t), width) or not np.isfinite(values).all():
             raise ModelError(f"{where}: load {name!r}: expected {(len(t), width)}, finite, got {values.shape}")
         amplitudes.append(values)

@@ -16,13 +16,13 @@
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from cms.body.reduced_body import ReducedBody
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, GivenArray, given
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from fe_models.foundation.units import Units, unit_system
@@ -74,8 +74,8 @@ class FlexibleLink:
 
     body: ReducedBody | str | os.PathLike[str]
     interfaces: Mapping[str, str]
-    position: Array = field(default_factory=lambda: np.zeros(3))
-    rotation_vector: Array = field(default_factory=lambda: np.zeros(3))
+    position: GivenArray = given(np.zeros(3))
+    rotation_vector: GivenArray = given(np.zeros(3))
 
 
 @presented

@@ -99,4 +99,4 @@ def marker_at(body: str, place: str | Position | Address | None, tolerance: floa
     if isinstance(place, Address):
         named = {kind: getattr(place, kind) for kind in KINDS_OF_ADDRESS}
         return Marker(body, **named, tolerance=place.tolerance)
-    return Marker(body, position=place, tolerance=tolerance)  # type: ignore[arg-type]
+    return Marker(body, position=place, tolerance=tolerance)

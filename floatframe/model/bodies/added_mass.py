@@ -10,14 +10,14 @@ rod = with_masses(rod, [AddedMass("small_end", 0.3), AddedMass("big_end", 0.5, o
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from cms.body.geometric_stiffness import SPIN_PAIRS, GeometricStiffness
 from cms.body.reduced_body import ReducedBody
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
@@ -46,8 +46,8 @@ class AddedMass:
 
     interface: str
     mass: float
-    offset: Array = field(default_factory=lambda: np.zeros(3))
-    inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    offset: GivenArray = given(np.zeros(3))
+    inertia: GivenArray = given(np.zeros((3, 3)))
 
     def __post_init__(self) -> None:
         where = f"added mass at {self.interface!r}"

@@ -1,10 +1,8 @@
 """Coordinates of the motion for couplers and user forces; each has a force that acts to increase it."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-import numpy as np
-
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
@@ -62,7 +60,7 @@ class AxialDistance:
 
     marker_a: Marker
     marker_b: Marker
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    axis: GivenArray = given((0.0, 0.0, 1.0))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", unit_vector("AxialDistance: axis", self.axis))
@@ -89,7 +87,7 @@ class AxialAngle:
 
     marker_a: Marker
     marker_b: Marker
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    axis: GivenArray = given((0.0, 0.0, 1.0))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", unit_vector("AxialAngle: axis", self.axis))

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from cms.body.reduced_body import ReducedBody
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, GivenArray, GivenArrayOrNone, given
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import ModelError
@@ -73,12 +73,12 @@ class FlexibleBody:
 
     name: str
     reduced: ReducedBody
-    position: Array | None = None
-    orientation: Array = field(default_factory=lambda: np.array([1.0, 0, 0, 0]))
-    velocity: Array = field(default_factory=lambda: np.zeros(3))
-    omega_B: Array = field(default_factory=lambda: np.zeros(3))  # noqa: N815
-    q: Array = field(default_factory=lambda: np.zeros(0))
-    q_dot: Array = field(default_factory=lambda: np.zeros(0))
+    position: GivenArrayOrNone = given(None)
+    orientation: GivenArray = given((1.0, 0.0, 0.0, 0.0))
+    velocity: GivenArray = given(np.zeros(3))
+    omega_B: GivenArray = given(np.zeros(3))  # noqa: N815
+    q: GivenArray = given(np.zeros(0))
+    q_dot: GivenArray = given(np.zeros(0))
     source: str = ""
     stiffening: bool | Literal["auto"] = "auto"
     leave_out_missing: bool = False

@@ -6,7 +6,7 @@ from typing import Protocol
 from cms.body.address import Address
 from cms.errors import BodyError
 from fe_models.body.kept_nodes import TOLERANCE
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import GivenArrayOrNone, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import ModelError
 from floatframe.model.checked_values import array_of_shape, rotation_of
@@ -55,8 +55,8 @@ class Marker:
 
     body: str | Named
     interface: str | None = None
-    position: Array | None = None
-    triad: Array | None = None
+    position: GivenArrayOrNone = given(None)
+    triad: GivenArrayOrNone = given(None)
     node: int | str | None = None
     element: int | str | None = None
     set: str | None = None

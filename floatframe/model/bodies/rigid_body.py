@@ -6,7 +6,7 @@ from numbers import Real
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, GivenArray, GivenArrayOrNone, given
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import ModelError
@@ -61,12 +61,12 @@ class RigidBody:
 
     name: str
     mass: float
-    inertia: Array
-    center_of_mass: Array = field(default_factory=lambda: np.zeros(3))
-    position: Array | None = None
-    orientation: Array = field(default_factory=lambda: np.array([1.0, 0, 0, 0]))
-    velocity: Array = field(default_factory=lambda: np.zeros(3))
-    omega_B: Array = field(default_factory=lambda: np.zeros(3))  # noqa: N815
+    inertia: GivenArray = given()
+    center_of_mass: GivenArray = given(np.zeros(3))
+    position: GivenArrayOrNone = given(None)
+    orientation: GivenArray = given((1.0, 0.0, 0.0, 0.0))
+    velocity: GivenArray = given(np.zeros(3))
+    omega_B: GivenArray = given(np.zeros(3))  # noqa: N815
     shapes: Sequence[Shape | Geometry] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Place
@@ -62,9 +62,9 @@ class Bushing:
     name: str
     marker_a: Place
     marker_b: Place
-    stiffness: Array = field(default_factory=lambda: np.zeros((6, 6)))
-    damping: Array = field(default_factory=lambda: np.zeros((6, 6)))
-    preload: Array = field(default_factory=lambda: np.zeros(6))
+    stiffness: GivenArray = given(np.zeros((6, 6)))
+    damping: GivenArray = given(np.zeros((6, 6)))
+    preload: GivenArray = given(np.zeros(6))
     characteristics: Mapping[str, TimeFunction] = field(default_factory=dict, metadata=NOT_OF_TIME)
     axes: str = "a"
 

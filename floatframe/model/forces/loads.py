@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker, Named
@@ -32,7 +32,7 @@ class Gravity:
         Ground axes, (3,) [m/s²], such as (0, 0, -9.81).
     """
 
-    acceleration: Array
+    acceleration: GivenArray = given()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "acceleration", array_of_shape("gravity", self.acceleration, (3,)))
@@ -105,8 +105,8 @@ class PointForce:
 
     name: str
     marker: Marker
-    force: Array = field(default_factory=lambda: np.zeros(3))
-    torque: Array = field(default_factory=lambda: np.zeros(3))
+    force: GivenArray = given(np.zeros(3))
+    torque: GivenArray = given(np.zeros(3))
     is_follower: bool = False
     amplitude: TimeFunction | None = None
 

@@ -3,11 +3,11 @@
 Evaluated in `floatframe.engine.kernels.connections.contact`.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.units import SPEED, Quantity
 from floatframe.errors import ModelError
@@ -115,7 +115,7 @@ class SphereContact:
     marker_b: Marker
     radius_b: float
     radius_a: float | None = None
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    axis: GivenArray = given((0.0, 0.0, 1.0))
     modulus: float | None = None
     stiffness: float | None = None
     exponent: float = 1.5

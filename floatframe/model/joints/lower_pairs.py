@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, GivenArray, GivenArrayOrNone, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.units import LENGTH, Quantity
 from floatframe.errors import ModelError
@@ -71,8 +71,8 @@ class RevoluteJoint(Joint):
     name: str
     marker_a: Place
     marker_b: Place
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
-    axis_b: Array | None = None
+    axis: GivenArray = given((0.0, 0.0, 1.0))
+    axis_b: GivenArrayOrNone = given(None)
     motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     size = 6  #: components of the unknown wrench
@@ -122,7 +122,7 @@ class PrismaticJoint(Joint):
     name: str
     marker_a: Place
     marker_b: Place
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    axis: GivenArray = given((0.0, 0.0, 1.0))
     motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     size = 9  #: components of the unknown wrench
@@ -182,8 +182,8 @@ class ScrewJoint(Joint):
     name: str
     marker_a: Place
     marker_b: Place
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
-    axis_b: Array | None = None
+    axis: GivenArray = given((0.0, 0.0, 1.0))
+    axis_b: GivenArrayOrNone = given(None)
     lead: float = METRE
     motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
@@ -258,8 +258,8 @@ class CylindricalJoint(Joint):
     name: str
     marker_a: Place
     marker_b: Place
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
-    axis_b: Array | None = None
+    axis: GivenArray = given((0.0, 0.0, 1.0))
+    axis_b: GivenArrayOrNone = given(None)
     motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     size = 9  #: components of the unknown wrench
@@ -349,8 +349,8 @@ class PlanarJoint(Joint):
     name: str
     marker_a: Place
     marker_b: Place
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
-    axis_b: Array | None = None
+    axis: GivenArray = given((0.0, 0.0, 1.0))
+    axis_b: GivenArrayOrNone = given(None)
     motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     size = 9  #: components of the unknown wrench

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, GivenArray, GivenArrayOrNone, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Place
@@ -56,7 +56,7 @@ class FixedJoint(Joint):
     name: str
     marker_a: Place
     marker_b: Place
-    rotation: Array | None = None
+    rotation: GivenArrayOrNone = given(None)
 
     size = 6  #: components of the unknown wrench: force, moment
     moment_b = MOMENT  #: index at which the moment on B starts in the wrench
@@ -99,7 +99,7 @@ class ConstantOrientation(Joint):
     name: str
     marker_a: Place
     marker_b: Place
-    rotation: Array | None = None
+    rotation: GivenArrayOrNone = given(None)
 
     size = 6  #: components of the unknown wrench
     moment_b = MOMENT  #: index at which the moment on B starts in the wrench
@@ -147,8 +147,8 @@ class UniversalJoint(Joint):
     name: str
     marker_a: Place
     marker_b: Place
-    axis: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))
-    axis_b: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))
+    axis: GivenArray = given((1.0, 0.0, 0.0))
+    axis_b: GivenArray = given((0.0, 1.0, 0.0))
     motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     size = 6  #: components of the unknown wrench
@@ -210,8 +210,8 @@ class ConstantVelocityJoint(Joint):
     name: str
     marker_a: Place
     marker_b: Place
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
-    axis_b: Array | None = None
+    axis: GivenArray = given((0.0, 0.0, 1.0))
+    axis_b: GivenArrayOrNone = given(None)
 
     size = 6  #: components of the unknown wrench: force and moment
     moment_b = MOMENT  #: index at which the moment on B starts in the wrench

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Place
@@ -47,7 +47,7 @@ class PointOnLine(Joint):
     name: str
     marker_a: Place
     marker_b: Place
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    axis: GivenArray = given((0.0, 0.0, 1.0))
     motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     size = 6  #: components of the unknown wrench
@@ -91,7 +91,7 @@ class PointOnPlane(Joint):
     name: str
     marker_a: Place
     marker_b: Place
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    axis: GivenArray = given((0.0, 0.0, 1.0))
     motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     size = 6  #: components of the unknown wrench

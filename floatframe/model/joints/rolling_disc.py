@@ -3,11 +3,11 @@
 Evaluated in `floatframe.engine.kernels.joints.rolling`.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.units import LENGTH, Quantity
 from floatframe.errors import ModelError
@@ -52,8 +52,8 @@ class RollingDisc(Joint):
     marker_a: Place
     marker_b: Place
     radius: float = METRE
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
-    axis_b: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))
+    axis: GivenArray = given((0.0, 0.0, 1.0))
+    axis_b: GivenArray = given((0.0, 1.0, 0.0))
 
     size = 9  #: components of the unknown wrench
     moment_b = MOMENT_B  #: index at which the moment on B starts in the wrench

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, GivenArrayOrNone, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker, Place
@@ -60,7 +60,7 @@ class SlidingJoint(Joint):
     marker_b: Place
     line: Sequence[str] = ()
     is_aligned: bool = False
-    normal: Array | None = None
+    normal: GivenArrayOrNone = given(None)
     motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     coordinates = ("distance",)

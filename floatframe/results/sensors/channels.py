@@ -3,11 +3,11 @@
 As outputs, they are sensors with one column, named "value".
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from fe_models.foundation.arrays import STRESS_COMPONENTS, Array
+from fe_models.foundation.arrays import STRESS_COMPONENTS, GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.units import Units
 from floatframe.errors import ModelError
@@ -60,7 +60,7 @@ class Channel:
 
     name: str
     marker: Marker
-    direction: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))
+    direction: GivenArray = given((1.0, 0.0, 0.0))
     quantity: str = "translation"
     relative_to: Marker | None = None
     rate: int = 0
@@ -202,7 +202,7 @@ class StressChannel:
     name: str
     body: str
     component: str
-    position: Array
+    position: GivenArray = given()
 
     def __post_init__(self) -> None:
         where = f"channel {self.name!r}"

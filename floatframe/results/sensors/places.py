@@ -4,14 +4,14 @@ A point on a flexible body is an interface, a kept node (by number, or by positi
 of the nodes of an element or set.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from cms.body.address import Address, FoundNodes
 from cms.errors import BodyError
 from fe_models.body.kept_nodes import TOLERANCE
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.engine.compiling.counted_angles import CountedAngle, angle_of
 from floatframe.engine.compiling.markers import MarkerData, find_body, find_marker
@@ -321,7 +321,7 @@ class AngleSensor:
     name: str
     marker_a: Marker
     marker_b: Marker
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    axis: GivenArray = given((0.0, 0.0, 1.0))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", unit_vector(f"sensor {self.name!r}: axis", self.axis))

@@ -9,7 +9,7 @@ from cms.body.reduced_body import ReducedBody
 from cms.body.stress import stress_of, von_mises
 from cms.errors import BodyError
 from fe_models.body.kept_nodes import TOLERANCE
-from fe_models.foundation.arrays import STRESS_COMPONENTS, Array
+from fe_models.foundation.arrays import STRESS_COMPONENTS, Array, GivenArrayOrNone, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
@@ -138,7 +138,7 @@ class StressSensor:
 
     name: str
     body: str
-    position: Array | None = None
+    position: GivenArrayOrNone = given(None)
     point: str | None = None
     node: int | str | None = None
     element: int | str | None = None
@@ -298,7 +298,7 @@ class StrainGauge:
     direction: Array
     young: float
     poisson: float
-    position: Array | None = None
+    position: GivenArrayOrNone = given(None)
     point: str | None = None
     node: int | str | None = None
     tolerance: float = TOLERANCE

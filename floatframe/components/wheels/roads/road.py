@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.components.wheels.roads.surface import CENTRE, CUBIC, FLAT, GRID, GRIP, road_height
 from floatframe.errors import ModelError
@@ -75,8 +75,8 @@ ENVELOPE_STEPS = 20  #: number of steps of an envelope per radius
 class Grip:
     """A friction factor along the road, for example of a wet patch, linear between knots."""
 
-    x: Array  #: increasing knots along the road, (n,) [m]
-    factor: Array  #: friction factors above 0, (n,); constant outside the knots
+    x: GivenArray = given()  #: increasing knots along the road, (n,) [m]
+    factor: GivenArray = given()  #: friction factors above 0, (n,); constant outside the knots
 
     def __post_init__(self) -> None:
         x = knots("road: grip: x", self.x)
@@ -211,8 +211,8 @@ def at_row(y: Array, rows: Array, place: float) -> Array:
 class Polyline:
     """A profile of straight pieces, which may have upright steps: two corners with equal x."""
 
-    x: Array  #: x of the corners, not decreasing, (n,) [m]
-    z: Array  #: z of the corners, (n,) [m]
+    x: GivenArray = given()  #: x of the corners, not decreasing, (n,) [m]
+    z: GivenArray = given()  #: z of the corners, (n,) [m]
 
     def __post_init__(self) -> None:
         x = array_of_shape("profile: x", self.x, (len(np.atleast_1d(np.asarray(self.x, dtype=object))),))
