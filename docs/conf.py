@@ -34,6 +34,7 @@ extensions = [
     "public_names",
     "plain_text",
     "copied_pages",
+    "reference_pages",
     "offline",
 ]
 exclude_patterns = ["extensions", "gallery/*", "**.ipynb_checkpoints"]

@@ -20,7 +20,7 @@ KINDS = {
     "system": FileKind("floatframe run", "floatframe.files.system_file.read_system:SystemFile", is_parametric=True),
     "sweep": FileKind("floatframe sweep", "floatframe.design.studies.study_file:StudyFile"),
     "optimization": FileKind("floatframe optimize", "floatframe.design.optimization.design_file:DesignFile"),
-    "laboratory": FileKind("floatframe study", "floatframe.design.laboratory.laboratory_file:LaboratoryFile"),
+    "laboratory": FileKind("floatframe compare", "floatframe.design.laboratory.laboratory_file:LaboratoryFile"),
     "shake": FileKind("floatframe shake", "floatframe.durability.shaking.shake_file:ShakeFile"),
     "fatigue": FileKind("floatframe fatigue", "floatframe.durability.fatigue.fatigue_file:FatigueFile"),
 }

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import pytest
 
 from fe_models.door import namespaces
+from fe_models.foundation.file_kinds import KINDS
 from tests.root import ROOT
 
 
@@ -25,7 +26,9 @@ def extension(name):
             sys.path.remove(str(ROOT / "docs" / "extensions"))
 
 
-drawn_math, offline, plain_text, public_names = map(extension, ("drawn_math", "offline", "plain_text", "public_names"))
+drawn_math, offline, plain_text, public_names, reference_pages = map(
+    extension, ("drawn_math", "offline", "plain_text", "public_names", "reference_pages")
+)
 
 
 def test_every_public_name_has_an_entry_on_one_page_of_names(tmp_path):
@@ -52,6 +55,21 @@ def test_a_page_of_names_that_is_gone_is_removed(tmp_path):
     public_names.write_pages(SimpleNamespace(srcdir=tmp_path))
     assert not (tmp_path / "api" / "cms.gone.rst").exists()
     assert (tmp_path / "api" / "cms.modes.rst").exists()
+
+
+def test_reference_pages_hold_every_command_option_and_key(tmp_path):
+    (tmp_path / "reference").mkdir()
+    (tmp_path / "reference" / "gone-file.md").write_text("old")
+    reference_pages.write_pages(SimpleNamespace(srcdir=tmp_path))
+    pages = {path.stem: path.read_text(encoding="utf-8") for path in (tmp_path / "reference").glob("*.md")}
+    assert set(pages) == {"cms-commands", "floatframe-commands", *(f"{kind}-file" for kind in KINDS)}
+    reduce = pages["cms-commands"].split("### cms reduce\n")[1].split("###")[0]
+    assert re.search(
+        r"^\| `--workers`, `-j` \| Where tasks are computed: .* \[cluster\]\(\.\./cluster\.md\)", reduce, re.MULTILINE
+    )
+    assert "```sh\ncms reduce rod.toml -o rod.h5\n" in reduce
+    beams = pages["job-file"].split("## \\[sections.NAME\\]\n")[1].split("##")[0]
+    assert re.search(r"^\| `shear` \| true or false: .* \| `true` \|$", beams, re.MULTILINE)
 
 
 def test_a_formula_is_a_picture_with_its_text_and_stands_on_the_line():

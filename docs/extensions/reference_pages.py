@@ -1,0 +1,131 @@
+"""Reference pages, made from the programs: all commands with their options, all keys of every kind of file."""
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import typer.main
+from copied_pages import put
+from sphinx.application import Sphinx
+
+import cms.cli.app
+import floatframe.cli.app
+from fe_models.foundation.file_kinds import KINDS
+from fe_models.foundation.parametric_file import schema_text
+
+PROGRAMS = {"cms": cms.cli.app.app, "floatframe": floatframe.cli.app.app}
+
+
+def write_pages(app: Sphinx) -> None:
+    """Write reference/NAME-commands.md and reference/NAME-file.md into the source folder; remove old pages."""
+    folder = Path(app.srcdir) / "reference"
+    folder.mkdir(exist_ok=True)
+    pages = {f"{name}-commands.md": commands_page(name) for name in PROGRAMS}
+    pages |= {f"{kind}-file.md": keys_page(kind) for kind in KINDS}
+    for old in folder.glob("*.md"):
+        if old.name not in pages:
+            old.unlink()
+    for name, text in pages.items():
+        put(text, folder / name)
+
+
+# commands --------------------------------------------------------------------------------------------------------
+
+
+def commands_page(program: str) -> str:
+    """Return the page of the commands of a program, in its groups."""
+    lines = [f"# Commands of {program}", "", f"`{program} COMMAND --help` prints the same.", ""]
+    last = None
+    for name, command in typer.main.get_command(PROGRAMS[program]).commands.items():  # type: ignore[attr-defined]
+        if command.rich_help_panel != last:
+            last = command.rich_help_panel
+            lines += [f"## {last}", ""]
+        lines += [f"### {program} {name}", "", *description(command.help or ""), *parameters_table(command.params), ""]
+    return "\n".join(lines)
+
+
+def description(text: str) -> list[str]:
+    """Return the help of a command: its paragraphs, then its examples as one block."""
+    paragraphs = [part.replace("\\[", "[") for part in re.split(r"\n\s*\n", text.strip())]
+    examples = [part.removeprefix("Example:").strip() for part in paragraphs if part.startswith("Example:")]
+    lines: list[str] = []
+    for part in paragraphs:
+        if not part.startswith("Example:"):
+            lines += [literal(part), ""]
+    return [*lines, "```sh", *examples, "```", ""] if examples else lines
+
+
+def parameters_table(parameters: list[Any]) -> list[str]:
+    """Return the arguments and options of a command as a table."""
+    rows = []
+    for each in parameters:
+        if each.hidden or each.name == "help":
+            continue
+        is_option = each.opts[0].startswith("-")
+        name = ", ".join(f"`{word}`" for word in (*each.opts, *each.secondary_opts)) if is_option else (
+            f"`{each.metavar or each.name.upper()}`"
+        )  # fmt: skip
+        default = each.default if isinstance(each.default, str | int | float) and each.default is not False else ""
+        rows.append((name, literal((each.help or "").replace("\\[", "[")), f"`{default}`" if default != "" else ""))
+    return table(("argument or option", "meaning", "default"), rows)
+
+
+# keys ------------------------------------------------------------------------------------------------------------
+
+
+def keys_page(kind: str) -> str:
+    """Return the page of the keys of a kind of file, a section for each of its tables."""
+    schema = json.loads(schema_text(kind))
+    lines = [
+        f"# Keys of a {kind} file", "",
+        f"`kind = \"{kind}\"`; `{KINDS[kind].command} FILE` runs it, and `floatframe schema {kind}` prints its schema. "
+        "A key without a default is required where its table is given, unless its meaning says otherwise.", "",
+        "## The file", "", *keys_table(schema), "",
+    ]  # fmt: skip
+    for definition in schema.get("$defs", {}).values():
+        if definition.get("properties"):
+            meaning = definition.get("description", "")
+            where, _, rest = meaning.partition(": ") if meaning.startswith("[") else (definition["title"], "", meaning)
+            lines += [f"## {literal(where)}", "", literal(rest), "", *keys_table(definition), ""]
+    return "\n".join(lines)
+
+
+def keys_table(definition: dict[str, Any]) -> list[str]:
+    """Return the keys of a table of a file, with their meanings and defaults."""
+    rows = []
+    for key, value in definition["properties"].items():
+        found = [value, *value.get("anyOf", ())]
+        defaults = [json.dumps(each["default"], ensure_ascii=False) for each in found if each.get("default")]
+        meaning = next((each["description"] for each in found if "description" in each), "")
+        rows.append((f"`{key}`", literal(meaning), f"`{defaults[0]}`" if defaults and len(defaults[0]) < 60 else ""))
+    return table(("key", "meaning", "default"), rows)
+
+
+# text ------------------------------------------------------------------------------------------------------------
+
+
+def table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[str]:
+    """Return the lines of a table, none if it has no rows."""
+    lines = [head, ("---",) * len(head), *rows] if rows else []
+    return [f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |" for row in lines]
+
+
+def literal(text: str) -> str:
+    """Return plain text so that MyST shows it as it is written; names of pages become links."""
+    parts = re.split(r"((?:docs/)\w+\.md)", re.sub(r"\s+", " ", text))
+    return "".join(linked(parts))
+
+
+def linked(parts: list[str]) -> Iterator[str]:
+    """Yield text with escaped marks, and links for the names of pages at the odd places."""
+    for k, part in enumerate(parts):
+        page = part.removeprefix("docs/")
+        yield f"[{page.removesuffix('.md')}](../{page})" if k % 2 else re.sub(r"([\\`*_{}<>\[\]#$])", r"\\\1", part)
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Write the pages before Sphinx looks for its sources."""
+    app.connect("builder-inited", write_pages)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
