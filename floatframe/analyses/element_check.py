@@ -199,7 +199,7 @@ def balance(placed: PlacedLaw, values: Array, where: str) -> list[str]:
         lost = [k for k in range(6) if k not in ACTS[acts] and wrench[m, k] != 0.0]
         if lost and marker.body >= 0:
             names = ", ".join(row_name(placed, 6 * m + k) for k in lost)
-            found.append(f"{where}: {names}: written, but acts = {acts!r} excludes it, so that it has no effect")
+            found.append(f"{where}: {names}: written, but acts = {acts!r} excludes this, so that it has no effect")
     if law.is_opposite and not np.allclose(wrench[0, :3], -wrench[1, :3], rtol=ROUNDING, atol=0.0):
         forces = " and ".join(str(np.round(each, 6).tolist()) for each in wrench[:, :3])
         found.append(f"{where}: is_opposite says the forces on both markers are opposite, got {forces}")
@@ -231,7 +231,7 @@ def without_ground(placed: PlacedLaw, slopes: Array) -> Array:
 
 
 def relative_error(n: int, own: Array, other: Array) -> Array:
-    """Return differences of derivatives relative to the largest in the row, apart from rounding of all wrenches."""
+    """Return differences of derivatives relative to the largest in the row, without those due to wrench roundoff."""
     scale = np.maximum(np.abs(own), np.abs(other)).max(axis=1, initial=0.0, keepdims=True)
     of_wrenches = scale[: 6 * n]
     of_wrenches[:] = np.maximum(of_wrenches, ROUNDING / DERIVATIVE * of_wrenches.max(initial=0.0))
@@ -247,9 +247,9 @@ def wrong_slopes(placed: PlacedLaw, own: Array, other: Array, where: str) -> lis
         return []
     row, column = (int(k) for k in np.unravel_index(error.argmax(), error.shape))
     kind = "its tangent" if callable(placed.law.tangent) else f"tangent = {placed.law.tangent!r}"
-    hint = "; where the law has a kink both may be right"
+    hint = "; at a kink of the law both may be right"
     if placed.law.tangent == "complex":
-        hint += ", and compiled powers of complex numbers, v**2, lose the step: write v*v"
+        hint += ", and compiled powers of complex numbers, v**2, lose the complex step: write v*v"
     return [
         f"{where}: derivative of {row_name(placed, row)} by {column_name(placed, column)}: {kind} gives "
         f"{own[row, column]:.6g}, differences {other[row, column]:.6g}{hint}"
@@ -276,7 +276,8 @@ def wrong_dependence(placed: PlacedLaw, slopes: Array, where: str) -> list[str]:
             else "a velocity, which may not depend on multipliers"
         )
         found.append(
-            f"{where}: {row_name(placed, 6 * n + n_z + j)} depends on {column_name(placed, column)}, but holds {what}"
+            f"{where}: {row_name(placed, 6 * n + n_z + j)} depends on {column_name(placed, column)}, but constrains "
+            f"{what}"
         )
     return found
 

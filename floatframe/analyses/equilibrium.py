@@ -75,7 +75,7 @@ log = logging.getLogger(__name__)
 LARGEST_TURN = 0.5  #: largest motion in one step: rotation [rad], and translation relative to the size of the system
 #: factors by which tau grows in one step if the residual decreases, and if it stagnates
 FASTEST_GROWTH, LEAST_GROWTH = 30.0, 2.0
-#: ratio of the last residual to the present one below which the residual counts as increasing, and tau is reduced
+#: ratio of the previous residual to the present one below which the residual counts as increasing, and tau is reduced
 STANDING = 0.9
 #: ratio of other forces to the assembled spring forces below which only springs move the system
 STANDING_SPRINGS = 1e-9
@@ -296,8 +296,8 @@ def steady_rotation(
     rolling = [name for name, rolls in zip(compiled.owners, is_held_velocity(model.rows.kind), strict=True) if rolls]
     if rolling:
         raise ModelError(
-            f"joint {rolling[0]!r} rolls without slip: equilibria and steady rotations do not know held velocities; "
-            "take steady_motion, also for speed 0"
+            f"joint {rolling[0]!r} rolls without slip: equilibria and steady rotations do not support velocity "
+            "constraints; use steady_motion, also for speed 0"
         )
     resting = compiled.resting_model
     flow = None
@@ -334,7 +334,7 @@ def steady_rotation(
                 forces, slows = without_slowing(compiled, work, W, parts, forces)
             size = size_of(W, forces)
             scale_of_forces = forces_at_work(compiled, work, parts, W)
-            # a stiffened body beyond the validity of its second-order terms
+            # a stiffened body is deformed beyond the validity of its second-order terms
             if not np.isfinite(size + scale_of_forces):
                 error = np.inf
                 break
@@ -365,7 +365,7 @@ def steady_rotation(
                 at_first = size if size > STANDING_SPRINGS * size_of(W, pulled) else size_of(W, pulled)
                 tau = 0.1 * compiled.length / max(at_first / np.sqrt(_total_mass(W)), STANDSTILL)
             elif not by_newton:
-                # below the tolerance, it is rounding
+                # below the tolerance, the residual is roundoff: tau grows as fast as allowed
                 fall = last / max(size, np.finfo(float).tiny) if not is_balanced else np.inf
                 tau *= min(max(fall, LEAST_GROWTH), FASTEST_GROWTH) if fall > STANDING else max(fall, 0.1)
             last = size
@@ -417,7 +417,7 @@ def steady_rotation(
         f"loads at or above buckling deform it too far, or the equilibrium is far away; {indefinite_mass_words(lost)}"
         if lost
         else f"forces are out of balance by {found.error:.2g} of the acting forces, most at body "
-        f"{worst_body(compiled, found.W, found.forces)!r}{states.description(tolerance)}; hold what can fall or drift, "
+        f"{worst_body(compiled, found.W, found.forces)!r}{states.description(tolerance)}; fix what can fall or drift, "
         "start nearer (from the state under a part of the loads), or add damping and integrate until it rests"
     )
     stood = f", without progress in the last {PATIENCE}" if found.has_stood else ""
@@ -438,7 +438,7 @@ def without_slowing(
     for i, block in enumerate(W):
         u = slice(first, first + len(block))
         s[first : first + 3] = work.state.R[i].T @ s[first : first + 3]
-        momentum[u] = block @ s[u]  # no mode moves, whose stiffness W holds as well
+        momentum[u] = block @ s[u]  # W also contains modal stiffness, but no mode moves
         first += len(block)
     held = np.abs(parts.G @ s)[is_driven_turn(compiled.model)]
     energy = float(momentum @ s)
@@ -633,10 +633,10 @@ def _require_rotation(compiled: CompiledSystem, work: Work, omega: Array) -> Non
         name = compiled.connection_names[joint]
         if compiled.model.rows.motion[worst] >= 0:
             raise ModelError(
-                f"steady_rotation: a motion drives joint {name!r} at another speed than {speed:g}, off by "
-                f"{rate[worst] * speed:.4g}; give it that speed, or remove it"
+                f"steady_rotation: a motion drives joint {name!r} at a speed that differs from {speed:g} by "
+                f"{rate[worst] * speed:.4g}; correct this speed, or remove the motion"
             )
         raise ModelError(
             f"steady_rotation: joint {name!r} does not allow a rotation with omega = "
-            f"{omega.tolist()}; give the axis of the joint, and its place as center"
+            f"{omega.tolist()}; give omega along the axis of the joint, and a point of this axis as center"
         )

@@ -7,7 +7,7 @@ consists of
     (1) N, a basis of the motions with G y = 0
     (2) a from least |J N a - e|² + mu |a|² with lower <= x + X N a <= upper (least distance of Lawson and Hanson)
     (3) the bodies are moved by N a, joint constraints are restored, and coordinates beyond a limit are brought back to
-        it; mu decreases if the errors did, and increases otherwise
+        it; mu decreases if the errors have decreased, and increases otherwise
 
 If the targets are out of reach, the search ends where no allowed motion reduces the errors, and reports this.
 """
@@ -306,7 +306,7 @@ class Search:
             tried = displaced(compiled.model, state, in_ground_axes(compiled.model, state, y))
             try:
                 tried = self.within(assembled(compiled, self.work, tried), values)  # (3)
-            except ModelError:  # too far for the joint constraints to be satisfied
+            except ModelError:  # the motion is too large for the joint constraints to be satisfied
                 mu = max(10 * mu, 1e-6)
                 continue
             found, new_far, new_turned = self.errors(tried)

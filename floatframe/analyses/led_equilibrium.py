@@ -46,7 +46,7 @@ class Balance:
 
     forces: Array  #: unbalanced forces f, (n_u,)
     gaps: Array  #: constraint errors g, (n_w,)
-    #: Newton step for given forces and errors: (n_u,) in ground axes, (n_w,)
+    #: function that returns the Newton step for given forces and errors: (n_u,) in ground axes, (n_w,)
     way: Callable[[Array, Array], tuple[Array, Array]]
 
 
@@ -76,9 +76,9 @@ def led_equilibrium(
     balance
         Unbalanced forces at a state; None if they are not finite.
     displaced
-        The state after a step, (n_u,) in ground axes.
+        Function that returns the state after a step, (n_u,) in ground axes.
     length_of
-        Largest translation of a step relative to the size of the system, or rotation [rad].
+        Function that returns the largest translation of a step, relative to the size of the system, or rotation [rad].
     """
     begun = balance(state, w)
     if begun is None:
@@ -118,7 +118,7 @@ def led_equilibrium(
 def is_left_by_none(parts: Linearized, K: tuple[Array, ...], W: tuple[Array, ...]) -> bool:
     """Return whether the flow W dx/dtau = -f, with closed joints, returns to an equilibrium from all nearby states.
 
-    Increasing loads follow branches which the flow leaves, such as a beam that stays straight beyond its buckling load.
+    Increasing loads may lead to unstable branches, such as a beam that stays straight beyond its buckling load.
     The rates are the eigenvalues of [[K, -Jᵀ], [G, V]] relative to [[W, 0], [0, 0]]; a rate below zero leads away. Only
     for systems with at most `LARGEST` unknowns.
     """

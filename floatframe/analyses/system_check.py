@@ -77,7 +77,7 @@ def check_system(
     state
         The state in which the run begins; None: the bodies as placed.
     has_fixed_steps
-        Whether the method keeps h; if not, h is the largest step.
+        Whether the method has the fixed step h; otherwise h is the largest step.
     """
     records = [mobility_record(system)]
     if records[0].verdict != "fail":
@@ -119,14 +119,14 @@ def mobility_record(system: System) -> QualityRecord:
     except FloatframeError as error:
         return record("mobility", "Mobility", "fail", str(error))
     words = (
-        f"{found.n_freedoms} independent motions: {found.n_bodies} bodies with {found.n_modes} modes less "
+        f"{found.n_freedoms} independent motions: {found.n_bodies} bodies with {found.n_modes} modes minus "
         f"{found.n_constraints} constraints; {found.mobility} if all bodies were rigid (count of Gruebler "
         f"{found.gruebler})"
     )
     words += redundant_words(found)
     shares = system.redundant == "minimum-norm"
     if found.n_redundant and not shares:
-        action = 'take a joint that holds less in place of one of these, or set redundant = "minimum-norm" in [system]'
+        action = 'replace one of these by a joint with fewer constraints, or set redundant = "minimum-norm" in [system]'
         return record("mobility", "Mobility", "fail", words, action, found.n_redundant, 0.0)
     if found.n_redundant:
         words += "; their reactions share the load by minimum norm"
@@ -211,8 +211,9 @@ def tangents_at(system: System, made: ConsistentState) -> Tangents:
 def system_vibrations(system: System, parts: Tangents) -> SystemVibrations | None:
     """Return the undamped vibrations at one state; None if there are too many motions, or none.
 
-    They are those of its matrices on the motions that the joints allow, K z = omega² M z, as if it were at rest there:
-    rotation and acceleration of the whole change the low ones. Motions without mass follow the others statically.
+    They are the solutions of K z = omega² M z for the motions that the joints allow, as if the system were at rest. (A
+    rotation or acceleration of the whole system changes the low frequencies.) Motions without mass follow the others
+    statically.
 
     Parameters
     ----------
@@ -272,7 +273,7 @@ def step_record(system: System, found: SystemVibrations, h: float, *, has_fixed_
         f"h = {1 / (FOLLOWED * f[-1]):.2g} all"
     )
     if not has_fixed_steps:
-        words += "; the method takes shorter steps where its tolerance asks for it"
+        words += "; the method takes shorter steps where its tolerance requires it"
     verdict: Verdict = "pass" if followed or not has_fixed_steps else "warn"
     action = f"take h = {1 / (FOLLOWED * f[0]):.2g} {second} or less, or leave the step to error_tolerance"
     return record("step", "Step size", verdict, words, action, float(steps[0]), FOLLOWED)

@@ -1,8 +1,8 @@
 """Mass, damping and stiffness matrices of the whole system at one state, computed from the Newton matrix.
 
 Small motions are described in axes that rotate with omega, in which the steady motion does not change. Every body
-rotates with these axes; it may in addition spin with a constant sigma, such as a wheel, whose inertia and forces do not
-depend on its angle.
+rotates with these axes. In addition, a body such as a wheel, whose inertia and forces do not depend on its angle, may
+spin with a constant sigma.
 
     xi    position of the frame origin and rotation, in axes that coincide with the body axes now and rotate with omega;
           modal coordinates

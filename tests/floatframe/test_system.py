@@ -79,7 +79,7 @@ def test_impossible_rigid_bodies_are_refused(arguments, words):
         ([SphericalJoint("pin", GROUND, "rod")], "expected a Marker at one end at least"),
         (
             [SphericalJoint("pin", Marker("bob"), "rod")],
-            "held at an interface only; give a Marker on 'rod', one of: end_a",
+            "act on a flexible body only at its interfaces; give a Marker on 'rod' at one of: end_a",
         ),
         ([SphericalJoint("pin", Marker("bob"), Marker("bob"))], "markers on two bodies, got both on 'bob'"),
         ([SphericalJoint("pin", Marker(GROUND), "ground")], "got both on 'ground'"),

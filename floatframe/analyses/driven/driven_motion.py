@@ -1,20 +1,20 @@
 """A fully driven system at one instant: positions, velocities and accelerations that joints and drives determine.
 
-The unknowns are the motions of the body frames; the rates of modal coordinates are zero (q' = q'' = 0). G are the
-columns of the constraint rows for these unknowns, M the masses, and P, V as in joints/rows/kinds.py:
+The unknowns are the motions of the body frames; the rates of modal coordinates are zero (q' = q'' = 0). G is the
+derivative of the constraint rows by these unknowns, M the mass matrix, and P, V as in joints/rows/kinds.py:
 
     (1) positions       G dx = -g                     Newton, until g = 0
     (2) velocities      G u = -dg/dt
     (3) accelerations   G u_dot = -d(G)/dt u - ...
     (4) wrenches        M u_dot - Jᵀ w = f
 
-Each is solved as one system with M, which has a unique solution if the drives leave nothing free. Elastic bodies either
-keep their assembled shape, or deform quasi-statically, with modes that balance joints, loads and the inertia of the
+Each is solved as one system with M, which has a unique solution if the drives leave no motion free. Elastic bodies
+either keep their assembled shape, or deform quasi-statically: their modes balance joints, loads and the inertia of the
 rigid motion,
 
     (5) K* q + inertia(q, u, u_dot) = Psiᵀ w + loads
 
-by Newton's method with the complete tangent, where (1)-(4) are solved again for every q.
+which Newton's method solves with the complete tangent, and with (1)-(4) solved again for every q.
 """
 
 from collections.abc import Callable
@@ -45,7 +45,7 @@ CLOSED = 1e-12  #: largest constraint error, relative to the size of the system
 #: constraint error, relative to the size of the system, that is accepted if rounding prevents a smaller one
 ACCEPTED = 1e-9
 MOST_ITERATIONS = 30
-#: change of a position in one iteration, in rad or relative to the size of the system, that ends the iteration
+#: change of a position in an iteration, in rad or relative to the size of the system, above which the method fails
 FAR = 1e3
 SETTLED = 1e-11  #: last change of q, relative to the size of q, at convergence
 LEAST_SHAPE = 1e-14  #: deformation, relative to the size of the system, that counts as zero if all loads vanish
@@ -157,7 +157,7 @@ def quasi_static_bodies(compiled: CompiledSystem, work: Work, state: State, t: f
             return replace(now, n_iterations=n)
     raise ConvergenceError(
         f"the deformation at t = {t:g} did not converge in {MOST_ITERATIONS} iterations (last change {change:.2g} of "
-        f"{size:.2g}): the loads exceed what these bodies carry, or buckle them; use frozen_bodies, or integrate",
+        f"{size:.2g}): the loads are too large for these bodies, or buckle them; use frozen_bodies, or integrate",
         t=t,
         h=0.0,
         residual=change,
@@ -243,7 +243,7 @@ def closed(
         state = displaced(model, state, in_ground_axes(model, state, x))
     raise ConvergenceError(
         f"the drives cannot be followed at t = {t:g}: {open_joints(compiled, error) or 'a joint opens'}; a drive leads "
-        "beyond the reach of the mechanism, or through a singular position: keep it within, or drive "
+        "beyond the reach of the mechanism, or through a singular position: limit its motion, or drive "
         "another coordinate",
         t=t,
         h=0.0,

@@ -203,7 +203,7 @@ def kinematics(
     head = replace(head, angles=compiled.angles)
     memory = memory_at(now.state, now.u_dot, now.w)
     memory = with_angles(system, float(t[0]), memory)
-    with ExitStack() as held:  # the place of the results, until the end of the analysis
+    with ExitStack() as held:  # reserves the location of the results until the end of the analysis
         place = None if output is None else held.enter_context(ResultsPlace(output, inputs=system.files))
         writer = None if place is None else ResultsWriter(place, head)
         kept: list[Rows] = []

@@ -68,7 +68,7 @@ class Column:
     sensor
         The sensor.
     column
-        Such as "force x".
+        Name of the column, such as "force x".
     name
         Name of the output; default: "sensor.column".
     """
@@ -236,8 +236,8 @@ def require_input(channel: Any) -> None:
         raise ModelError(f"linearize: channel {channel.name!r} is a stress: expected a force or torque as an input")
     if not isinstance(channel, AnyInput):
         raise ModelError(
-            f"linearize: {getattr(channel, 'name', channel)!r} is no input: expected a Channel or CoordinateChannel (a "
-            "force along it), ForceInput, DriveMotion, BaseMotion or ParameterInput"
+            f"linearize: {getattr(channel, 'name', channel)!r} is not an input: expected a Channel or a "
+            "CoordinateChannel (a force along it), ForceInput, DriveMotion, BaseMotion or ParameterInput"
         )
 
 

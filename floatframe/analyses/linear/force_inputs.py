@@ -1,6 +1,6 @@
 """Amplitudes of point forces and load cases, and motors of joints, as inputs of a linearised system.
 
-The equations are linear in such an amplitude a, so its column is the difference of their residuals for a + 1 and a:
+The equations are linear in such an amplitude a, so its column is the difference of the residuals for a + 1 and a:
 
     residual(a + 1) - residual(a) = -F,   rows(a + 1) - rows(a) = E
 """
@@ -93,7 +93,7 @@ def force_column(small: SmallMotions, channel: ForceInput) -> tuple[Array, Array
 
 
 def forces_of_amplitude(system: System, now: Trajectory, channel: ForceInput) -> tuple[InputForce, ...]:
-    """Return the input's loads on interfaces of a flexible body, or that it is a load case on the body."""
+    """Return the input's loads on interfaces of a flexible body, or an entry that marks a load case on the body."""
     force = force_of(system, channel)
     if isinstance(force, BodyLoad):
         return (InputForce(body_name(force.body), "", np.zeros(6), force.load_case),)

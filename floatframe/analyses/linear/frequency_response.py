@@ -77,7 +77,7 @@ class FrequencyResponse:
         Raises
         ------
         ModelError
-            If other than so many axes are given.
+            If another number of axes is given.
         """
         from matplotlib.figure import Figure
 

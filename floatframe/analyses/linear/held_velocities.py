@@ -70,8 +70,8 @@ def rolling(parts: Tangents, Omega: Array, N: Array, inputs: Inputs) -> Rolling 
     terms = (np.abs(parts.G_x[rows]) + np.abs(parts.G_v[rows]) @ np.abs(Omega)) @ np.abs(N) / size[:, None]
     if np.abs(repeated).max(initial=0.0) > SAME * terms.max(initial=0.0):
         raise ModelError(
-            "linearize: rolling joints contradict each other: their velocity constraints are redundant, but the "
-            "positions that follow from them differ"
+            "linearize: rolling joints contradict each other: their velocity constraints are redundant, but "
+            "lead to different positions"
         )
     S, T = right[rank:].T, right[:rank].T
     known = known / values[:rank, None]

@@ -6,7 +6,7 @@ With the value s of the input, each type enters the equations of `system_matrice
     drive, g(x, f(t)) = 0         E = ∂g/∂f, the rate of the row for f = t at rest
     base, a rigid motion s of markers on the ground: E, E' = derivatives of the rows by their positions and velocities
     parameter p of Q = f(x, v, p)   E = -∂f/∂p
-    amplitude of a force, motor     F, E from a unit change (`force_inputs`)
+    amplitude of a force or motor   F, E from a unit change (`force_inputs`)
 """
 
 from collections.abc import Sequence
@@ -85,8 +85,8 @@ class DriveMotion:
 class BaseMotion:
     """A motion of the base: of the ground side of joints, springs and bushings.
 
-    Several bases are several inputs, each with its `joints`; coordinates of these joints in couplers and user forces
-    are included. All other parts of the ground stay at rest: gravity, and the reference of sensors.
+    For several bases, define an input with its own `joints` for each. Coordinates of these joints in couplers and user
+    forces move too. All other parts of the ground stay at rest, as do gravity and the reference of sensors.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ class BaseMotion:
     quantity
         "translation", or "rotation" about the direction.
     about
-        a point on the axis of a rotation, (3,) [m].
+        Point on the axis of a rotation, (3,) [m].
     joints
         Moving joints, springs, bushings, couplers, user forces; None: all.
     rate
@@ -287,7 +287,7 @@ def base_rows(small: SmallMotions, base: BaseColumn, channel: BaseMotion) -> tup
 
     if small.is_turning:
         raise ModelError(
-            f"input {channel.name!r}: a base moves under a system at rest; about a steady rotation "
+            f"input {channel.name!r}: base motions are supported only for a system at rest; about a steady rotation "
             "use drives and forces"
         )
     model, work = small.compiled.model, small.work

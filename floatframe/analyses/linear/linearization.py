@@ -112,7 +112,7 @@ class LinearSystem:
     equilibrium
         The steady motion.
     M, C, K
-        Mass, damping and stiffness, (n_z, n_z). C holds gyroscopic terms; K holds geometric, centrifugal and
+        Mass, damping and stiffness, (n_z, n_z). C includes gyroscopic terms; K includes geometric, centrifugal and
         circulatory terms.
     B, B_rate, B_acceleration
         Forces per input and its rates, (n_z, n_s).
@@ -207,7 +207,7 @@ class LinearSystem:
             first += len(mass)
 
     def with_mass(self) -> tuple["LinearSystem", Array]:
-        """Return the system without massless motions, which follow the others statically, and z by its motions.
+        """Return the system without massless motions, which follow the others statically, and the map from its z to z.
 
         The direct effect of inputs on outputs through these motions is added to D, D_rate and D_acceleration. Third
         rates of inputs, and damping along massless motions, are neglected.
@@ -389,14 +389,14 @@ def linearize(
         or sensors, their columns (`Column`) and channels. Directions rotate with a steady rotation. None: those of the
         system.
     formulation
-        "relative": z are the coordinates of the joints of the tree and the modes, less those that close its loops, and
-        have names, `LinearSystem.coordinates`. "absolute": z are any independent motions.
+        "relative": z are the coordinates of the joints of the tree and the modes, without those that close loops; their
+        names are `LinearSystem.coordinates`. "absolute": z are any independent motions.
 
     Raises
     ------
     ModelError
-        If there is no such formulation, nothing can move, the state moves but is not steady, a channel is at a place
-        that does not exist, or a requested column is not linear here.
+        If there is no such formulation, nothing can move, the state moves but is not steady, a channel refers to a
+        point that does not exist, or a requested column is not linear here.
     """
     inputs = tuple(named_input(system, each) for each in (inputs_of(system.inputs) if inputs is None else inputs))
     outputs = tuple(named_output(system, each) for each in (outputs_of(system.outputs) if outputs is None else outputs))
@@ -560,10 +560,10 @@ def with_states(parts: dict[str, Array], n_states: int) -> dict[str, Array]:
 def motions_of_inputs(
     small: SmallMotions, parts: Tangents, by_inputs: Inputs, N: Array, K_z: Array, D_0: Array, moves: NDArray[np.bool_]
 ) -> tuple[Array, Array]:
-    """Return Y with G Y + E = 0 and the sizes of its terms, (n_u, n_s), without force along motions that K_z resists.
+    """Return Y with G Y + E = 0, which needs no force along motions that K_z resists, and the sizes of its terms.
 
-    Y begins as a rigid motion if a base carries the whole system, and otherwise as the smallest solution of
-    G Y + E = 0. A motion allowed by the joints is then added, which removes the forces.
+    Both have the shape (n_u, n_s). Y begins as a rigid motion if a base moves the whole system, and otherwise as the
+    smallest solution of G Y + E = 0. Then a motion allowed by the joints is added, which removes the forces.
 
     Parameters
     ----------
@@ -666,8 +666,9 @@ def massive_and_massless(M: Array) -> tuple[Array, Array]:
 def allowed_motions(system: System, G: Array) -> Array:
     """Return a basis of the null space of G, (n_u, n_z), with one column for each motion that stays independent.
 
-    Some motions d follow the others i, N_i = 1 and N_d = -G_d⁺ G_i. Bodies depend before modes do, so that stiff modes
-    have columns of their own: in a mixed basis, the rounding of a stiffness of 1e10 hides motions of a few hertz.
+    Some motions d depend on the others i: N_i = 1 and N_d = -G_d⁺ G_i. Motions of bodies become dependent before modes,
+    so that stiff modes have their own columns: in a mixed basis, the roundoff of a stiffness of 1e10 hides motions of a
+    few hertz.
     """
     sizes = compiled_system(system).motion_lengths
     is_mode = modes_among_motions(system)

@@ -99,10 +99,10 @@ def root_locus(
     """Follow the modes of a system while a parameter changes.
 
     Two modes at neighbouring values are the same mode if their shapes share more than half of their kinetic energy. A
-    mode whose frequency passes zero, such as a whirl seen from axes that turn with a rotor at its critical speed,
-    continues in the conjugate of a mode. Where shapes are alike, as those of both whirls above that speed, eigenvalues
-    decide, if they change little against their difference. If a mode is lost or undecided in a step, the step is
-    halved, up to three times. After that, its column ends. A new mode begins a new column.
+    mode whose frequency passes zero, such as a whirl in axes that rotate with a rotor at its critical speed, continues
+    in the conjugate of a mode. If shapes are alike, as those of both whirls above that speed, eigenvalues decide,
+    provided that they change little compared with their difference. If a mode is lost or undecided in a step, the step
+    is halved, up to three times. After that, its column ends. A new mode begins a new column.
 
     Parameters
     ----------
@@ -206,8 +206,8 @@ def modes_at(linear: LinearSystem) -> Modes:
 def root_of(mass: Array) -> Array:
     """Return a square root of a body's mass matrix that depends continuously on the matrix.
 
-    It is the symmetric one for motions of mass 1: in units of translations, rotations and modes, the eigenvalues of the
-    matrix lie too far apart for a small or large body.
+    It is the symmetric square root in coordinates with diagonal masses of 1. In the units of translations, rotations
+    and modes, the eigenvalues of the matrix would be too far apart for a small or large body.
     """
     size = np.sqrt(np.diag(mass))
     scale = 1 / np.where(size > 0, size, 1.0)
@@ -285,9 +285,9 @@ def distances(alive: list[Branch], now: Modes, *, is_conjugate: bool) -> Distanc
 def undecided(like: Array, shapes: Array, last: Array, values: Array) -> Array:
     """Return which assigned pairs of branch and mode could be assigned otherwise just as well, (n_pairs,).
 
-    Two pairs could be exchanged if their shapes are alike, their eigenvalues differ, and the eigenvalues that belong
-    together are not clearly closer to each other than to the others. `values`: the eigenvalue of the mode of pair k, or
-    its conjugate, as it would continue the branch of pair i, (n_pairs, n_pairs).
+    Two pairs could be exchanged if their shapes are alike, their eigenvalues differ, and the eigenvalues of a pair are
+    not clearly closer to each other than to those of the other pair. `values`, (n_pairs, n_pairs): the eigenvalue, or
+    its conjugate, with which the mode of pair k would continue the branch of pair i.
     """
     kept, found = np.diag(shapes), np.diag(values)
     moves = np.abs(last[:, None] - values)
@@ -363,7 +363,7 @@ def campbell(
         driven = turning_with(system, speed * axis)
         try:
             last[:] = [steady_rotation(driven, speed * axis, center=center, state=state)]
-        except ConvergenceError:  # the equilibrium at another speed may be too far away, as beyond a critical speed
+        except ConvergenceError:  # the equilibrium at the last speed may be too far away, as beyond a critical speed
             last[:] = [steady_rotation(driven, speed * axis, center=center)]
         seen_at[speed] = steady_values(driven, last[0], observed)
         return linearize(driven, last[0], inputs=(), outputs=())

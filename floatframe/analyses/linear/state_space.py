@@ -104,8 +104,8 @@ def named_state_space(linear: LinearSystem) -> NamedStateSpace:
 
     (1) massless motions are eliminated, because they follow the others
     (2) named motions are chosen until there are as many as independent motions: first joint coordinates, then modal
-        coordinates, then motions of body frames; each time the one with the largest part that is independent of those
-        already chosen, in the norm of the mass matrix
+        coordinates, then motions of body frames; each time the motion with the largest part that is independent of the
+        motions already chosen, in the norm of the mass matrix
     (3) the states are the chosen motions, their rates, the states of elements and user forces, and the integrals of
         inputs that are velocities or accelerations
 

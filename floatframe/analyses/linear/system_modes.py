@@ -108,7 +108,7 @@ def system_modes(linear: LinearSystem) -> SystemModes:
     omega2, Z = undamped_modes((K + K.T) / 2, (M + M.T) / 2)
     highest = float(np.sqrt(np.abs(omega2).max(initial=0.0))) or 1.0  # 1 if only states act as springs
     beside = ROUNDING * motions_beside(system, Z)
-    # errors of the entries of Z.T @ K @ Z and Z.T @ C @ Z, by the frequencies of their own two modes
+    # errors of the entries of Z.T @ K @ Z and Z.T @ C @ Z, from the frequencies of the two modes of each entry
     higher = np.maximum.outer(np.abs(omega2), np.abs(omega2))
     error_K = MODEL * higher + ROUNDING * np.abs(Z).T @ np.abs(K) @ np.abs(Z) + beside.T @ np.abs(K) @ beside
     error_C = UNDAMPED * np.sqrt(higher) + ROUNDING * np.abs(Z).T @ np.abs(C) @ np.abs(Z)
@@ -157,7 +157,7 @@ def system_modes(linear: LinearSystem) -> SystemModes:
 def undamped_modes(K: Array, M: Array) -> tuple[Array, Array]:
     """Return ascending omega² and the modes of a symmetric matrix pair, low modes as accurate as high ones.
 
-    Errors of the solver are proportional to the highest omega², so that much lower modes are solved for again in their
+    Errors of the solver are proportional to the highest omega². Therefore much lower modes are computed again in their
     own subspace.
     """
     omega2, Z = la.eigh(K, M)
@@ -204,8 +204,8 @@ def motions_beside(system: LinearSystem, Z: Array) -> Array:
     """Return the sizes of motions coupled with each mode, at equal kinetic energy, (n_z, n).
 
     Directions of axes and of a steady rotation have the relative error `ROUNDING`, so that every motion contains
-    that fraction of coupled motions. K of a free motion is then not zero, but of the order of its square, with either
-    sign.
+    that fraction of coupled motions. K of a free motion is then not zero, but of the order of the square of this
+    fraction, with either sign.
     """
     n = system.n_z
     M, C, K = (np.abs(a[:n, :n]) for a in (system.M, system.C, system.K))
@@ -236,7 +236,7 @@ def with_motions_that_cost_nothing(A: Array, eigenvalues: Array, V: Array, error
     """Return one mode of each conjugate pair, and a mode with lambda = 0 for each motion without resistance.
 
     Q spans the eigenvectors of zero. Motions without resistance are the null space of A within Q, without velocities.
-    The two eigenvectors of such a motion are equal but for rounding, so that Q has fewer columns than there are zeros.
+    The two eigenvectors of such a motion differ only by roundoff, so that Q has fewer columns than there are zeros.
     """
     is_zero = np.abs(eigenvalues) <= errors
     kept = ~is_zero & (eigenvalues.imag >= 0)

@@ -6,8 +6,8 @@ coordinate k. If there are loops, their constraints G N_s ds = 0 make as many co
 
     ds_d = -(G N_s)_d⁺ (G N_s)_i ds_i,        N = N_s [1; -(G N_s)_d⁺ (G N_s)_i]
 
-Dependent coordinates are chosen far from the ground rather than near it, and joints rather than modes, provided that
-their column is at least a tenth of the largest one.
+Joint coordinates far from the ground are chosen as dependent rather than those near it, and joint coordinates rather
+than modes, provided that their column is at least a tenth of the largest one.
 """
 
 from dataclasses import dataclass
@@ -123,8 +123,8 @@ def preference(tree: Tree) -> IntArray:
 def dependent_coordinates(C: Array, preferred: IntArray) -> IntArray:
     """Return the dependent columns of C, as many as its rank, by elimination with preferred pivots.
 
-    Candidates are the columns whose remaining part is at least a tenth of the largest one. Among them, the pivot is the
-    column with the highest preference, the last one of several.
+    Candidates are the columns whose remaining part is at least a tenth of the largest one. The pivot is the candidate
+    with the highest preference; if several have it, the last of them.
     """
     left = C.copy()
     first = np.linalg.norm(left, axis=0).max(initial=0.0)

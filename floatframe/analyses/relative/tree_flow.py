@@ -6,12 +6,13 @@ loop-closing connections (docs/relative.md §5):
     (2) (M/tau + K) ds + B dw = -rho,   C ds + V dw = -g
 
 K is the Newton matrix of positions (c_k alone), because the rates of joints do not change. In a steady rotation, the
-rates of a joint at the ground may depend on its coordinates, for example of a body on a ball joint or without a joint:
+rates of a joint at the ground may depend on its coordinates, for example for a body on a ball joint or without joints:
 ds_dot = S ds, ds_ddot = S' ds, with S and S' from finite differences. K is then replaced by K + C S + M S', where C and
 M are the Newton matrices of rates and accelerations.
 
-The reactions of the joints of the tree follow from the bodies that they carry. Along a free coordinate, the reaction is
-replaced by the force of springs, motors and friction, so that the difference appears as unbalanced force of the bodies.
+The reactions of the joints of the tree follow from the equilibrium of the bodies behind them. Along a free coordinate,
+the reaction is replaced by the force of springs, motors and friction, so that the difference appears as unbalanced
+force of the bodies.
 """
 
 from collections.abc import Callable
@@ -86,7 +87,7 @@ class TreeFlow:
         joints = self.placed(work)
         if slopes is not None:
             ds, mu = self.turning_step(work, tau, *slopes)
-        elif len(self.model.states.row):  # coordinates that only states hold have no stiffness to eliminate them by
+        elif len(self.model.states.row):  # coordinates on which only states act have no stiffness for elimination
             M, K = self.matrix(work, 1.0, 0.0, 0.0), self.matrix(work, 0.0, 0.0, 1.0)
             ds, mu = self.dense_step(work, tau, M, K)
         else:

@@ -80,7 +80,7 @@ def path_of(
     if center is not None:
         center = array_of_shape("steady_motion: center", center, (3,))
         if not curvature:
-            raise ModelError("steady_motion: center: expected a curvature too, whose sign is the side of the turn")
+            raise ModelError("steady_motion: center: expected a curvature too, whose sign is the side of the centre")
         arm = point - center
         arm = arm - (arm @ axis) * axis
         distance = float(np.linalg.norm(arm))
@@ -135,6 +135,6 @@ def spins_of(
         if compiled.model.bodies.n_q[spin.body]:
             raise ModelError(
                 f"steady_motion: body {compiled.body_names[spin.body]!r} is flexible and spins relative to body "
-                f"{path.name!r}: its modes would turn with it; make it rigid (is_rigid), or take steady_rotation"
+                f"{path.name!r}: its modes would rotate with it; make it rigid (is_rigid), or use steady_rotation"
             )
     return tuple(spins), np.array(s, dtype=float)

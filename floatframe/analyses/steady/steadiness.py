@@ -37,14 +37,14 @@ LEAST = 1e-3  #: smallest acting forces assumed, relative to forces that would r
 ALONG = 1e-6  #: largest deviation of a velocity from the common motion, relative to the largest velocity
 SAME = 1e-5  #: largest change of a matrix, relative to its largest entry; flanges in a curve give 3e-6
 ROUND = 1e-6  #: largest relative change of a mass matrix
-TURN = 1.234  #: rotation of the fastest body until the later time [rad], no simple fraction of a circle
+TURN = 1.234  #: rotation of the fastest body until the later time [rad]; not a simple fraction of a circle
 AHEAD = 0.1  #: distance travelled until the later time if nothing spins, relative to the size of the system
 MOST_ITERATIONS = 10
 NOT = "linearize: this state is not steady:"
 AT_ONCE = "use the state of steady_motion or steady_rotation"  #: advice if forces are unbalanced at the state
 #: advice if forces are balanced at the state but not later
 LATER = (
-    "what acts there changes as the system moves on, such as a torsion spring to the ground that is wound up, "
+    "a force there changes as the system moves on, such as a torsion spring to the ground that winds up, "
     "an uneven road, or a function of time"
 )
 

@@ -1,6 +1,6 @@
 """Steady running: the state of a vehicle in straight or circular motion that is constant in the moving frame.
 
-It is found by damped Newton steps for the equations of `equations.py`.
+It is found by damped Newton steps for the equations below.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -175,7 +175,7 @@ class Equations:
         if len(trial.w) != int(compiled.model.connections.w0[-1]):
             raise ModelError("steady_motion: the function returns systems with different connections")
         require_off_stops(system, trial.w)
-        # otherwise joints would depend on the rotation of a wheel
+        # close the joints first: if they are open, their equations depend on the angle of a spinning wheel
         trial = replace(trial, state=assembled(compiled, work, trial.state, trial.w))
         return Place(system, compiled, work, trial, self.evaluated(compiled, work, trial))
 
@@ -335,7 +335,7 @@ class Equations:
                 if not effect or LEAST_EFFECT <= effect <= MOST_EFFECT:
                     break
                 h *= EFFECT / effect
-            # rates are evaluated after the joints are satisfied again, as for motions
+            # rates are evaluated after the joints are closed again, as for motions
             parts = [after.f - now.f, (after.g - now.g)[rows], np.zeros(len(held) + n_gaps)]
             columns.append(np.concatenate(parts) / h)
         return columns
@@ -468,7 +468,7 @@ def steady_motion(
         Initial values of open parameters of the system, by name, such as a steer angle or a drive torque.
     center
         A point on the axis of the circle, ground axes, (3,) [m], if a track determines it. It needs a curvature, whose
-        magnitude is one over the distance to the reference body. Default: beside the reference body, at this distance.
+        magnitude is the inverse of the distance to the reference body. Default: beside this body, at this distance.
     guided
         Whether a track determines the lateral position of the system. If not, the reference body passes exactly through
         its point.

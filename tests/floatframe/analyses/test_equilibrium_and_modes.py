@@ -345,7 +345,7 @@ def strip(force, *, clamped=True):
     ("system", "told"),
     [
         (System([rod()], [], [Gravity((0, 0, -G))]), "nor by increasing loads .8 solves, up to 0 % of them.*'rod'"),
-        (strip((0, 0, 5.0), clamped=False), "nor by increasing loads .* hold what can fall or drift"),
+        (strip((0, 0, 5.0), clamped=False), "nor by increasing loads .* fix what can fall or drift"),
     ],
     ids=["falling", "loose"],
 )

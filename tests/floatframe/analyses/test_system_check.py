@@ -114,7 +114,7 @@ def test_the_record_names_mobility_velocities_and_the_step_that_follows_the_vibr
     result, records = checked(tmp_path / "sledge.toml")
     assert result.exit_code == 0
     assert records["mobility"]["reason"].startswith(
-        "2 independent motions: 2 bodies with 0 modes less 10 constraints; 2 if"
+        "2 independent motions: 2 bodies with 0 modes minus 10 constraints; 2 if"
     )
     assert f"speed is {20 * second:.3g} mm/{units[-2:].strip('-')}, of body 'sledge'" in records["start"]["reason"]
     change = 5.0 / np.hypot(20.0, 5.0)

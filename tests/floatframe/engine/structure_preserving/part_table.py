@@ -26,15 +26,15 @@ class Refusal:
     reason: str  #: in the table
 
 
-VELOCITIES = Refusal("joint 'roll' holds velocities", "it has non-holonomic constraints")
+VELOCITIES = Refusal("joint 'roll' has nonholonomic constraints", "it has non-holonomic constraints")
 NORMAL = Refusal("force 'rub' has friction by the normal force", "its friction depends on the reaction of its joint")
 MASSLESS = Refusal("body 'soft' has a mode without mass", "its velocity has no momentum")
-CONTACT = Refusal("contact 'touch' depends on the speed with which it began", "its force depends on its history")
-MEMORY = Refusal(r"'\w+' has a memory of its own", "it counts angles beyond full turns, or has states")
+CONTACT = Refusal("the force of contact 'touch' depends on its initial speed", "its force depends on its history")
+MEMORY = Refusal(r"'\w+' has a memory, which this scheme", "it counts angles beyond full turns, or has states")
 OWN = Refusal(r"element '\w+' has states or multipliers of its own", "it has its own states or multipliers")
 MULTIPLIERS = Refusal(r"element '\w+' has multipliers of its own", "its multipliers would act at both ends of a step")
 ACCELERATIONS = Refusal(
-    "element 'heavy' feels accelerations", "it depends on accelerations, which the scheme does not have"
+    "element 'heavy' depends on accelerations", "it depends on accelerations, which the scheme does not have"
 )
 
 HELD = (

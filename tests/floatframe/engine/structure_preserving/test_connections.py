@@ -114,5 +114,5 @@ def test_a_latch_catches_in_the_midst_of_a_motion(name):
 
 
 def test_rolling_is_refused_by_the_variational_scheme():
-    with pytest.raises(ModelError, match="Variational: joint 'roll' holds velocities"):
+    with pytest.raises(ModelError, match="Variational: joint 'roll' has nonholonomic constraints"):
         integrate(CONNECTED["rolling disc"](), Variational(), 1.0, 0.1)

@@ -217,5 +217,5 @@ def test_an_interrupted_run_goes_on_to_the_same_motion(tmp_path, monkeypatch):
 
 
 def test_elements_that_feel_accelerations_are_refused_by_name():
-    with pytest.raises(ModelError, match=r"RelativeOde: element '\w+' feels accelerations"):
+    with pytest.raises(ModelError, match=r"RelativeOde: element '\w+' depends on accelerations"):
         integrate(pair("rigid")[0], RelativeOde(), 0.1, 0.1)

@@ -145,7 +145,10 @@ def test_what_a_held_position_may_not_depend_on_is_told():
     element = Law(held_speed, multipliers=("f",), holds=(POSITION,))
     place = RigidBody("b", 1.0, np.eye(3), position=(0, 0, -0.3))
     found = check_element(System([place], elements=[element]), "e")
-    told = "g of f depends on velocity z of marker 2, but holds a position, which may depend only on positions and time"
+    told = (
+        "g of f depends on velocity z of marker 2, but constrains a position, which may depend only on positions and "
+        "time"
+    )
     assert any(told in each for each in found.findings), found.findings
 
 
@@ -333,7 +336,7 @@ def test_schemes_that_do_not_know_elements_name_them():
     with pytest.raises(ModelError, match="Variational: element 'e' has multipliers of its own"):
         integrate(falling(Disc("e", ENDS[1], 0.5)), Variational(), 0.01, 1e-3)
     for method in (EnergyMomentum(), Variational()):
-        with pytest.raises(ModelError, match=f"{type(method).__name__}: element 'e' feels accelerations"):
+        with pytest.raises(ModelError, match=f"{type(method).__name__}: element 'e' depends on accelerations"):
             integrate(falling(Law(square, accelerations=True)), method, 0.01, 1e-3)
     with pytest.raises(ModelError, match="open_equations: 'e' has states of its own"):
         open_equations(falling(Jack("e", ENDS[1])))
