@@ -66,7 +66,7 @@ class Address:
     Parameters
     ----------
     node
-        The user's number; "INSTANCE.number" if several instances have it.
+        The user's node number; "INSTANCE.number" if several instances have this number.
     element
         The user's number of an element, as for a node; selects the kept nodes of its surface.
     set
@@ -156,8 +156,8 @@ class Address:
             if not len(rows):
                 names = ", ".join(reduced.node_name(int(row)) for row in asked[:NEAREST])
                 raise BodyError(
-                    f"{where}: {self} has no stress in its file (node {names}): no solid or skin is there, or the file "
-                    "holds no stress modes; name a stress point, or a node on the surface"
+                    f"{where}: {self} has no stress in its file (node {names}): it is not on a solid or skin, or the "
+                    "file contains no stress modes; name a stress point, or a node on the surface"
                 )
         place = reduced.frame.origin + reduced.frame.axes @ reduced.nodes[rows].mean(axis=0)
         return FoundNodes(str(self), rows, distance, tuple(reduced.node_name(int(row)) for row in rows), place)
@@ -166,7 +166,7 @@ class Address:
         """Return the kept node closest to the position among the eligible ones, (1,), and its distance."""
         frame, nodes = reduced.frame, reduced.nodes
         if not len(nodes):
-            raise BodyError(f"{where}: it has no nodes; its place at {self} is not known")
+            raise BodyError(f"{where}: the body has no nodes, so {self} cannot be found")
         away = np.linalg.norm(nodes - (self.position - frame.origin) @ frame.axes, axis=1)
         if among is not None and among.any():
             away = np.where(among, away, np.inf)
@@ -179,7 +179,7 @@ class Address:
                 x = ", ".join(f"{value:.6g}" for value in frame.origin + frame.axes @ nodes[row])
                 near.append(f"node {reduced.node_name(int(row))} at [{x}], {away[row]:.3g} away")
             raise BodyError(
-                f"{where}: no node that its file keeps is at {self}, within {self.tolerance:g} of its size {size:.4g}; "
+                f"{where}: no kept node is at {self}, within {self.tolerance:g} of the body size {size:.4g}; "
                 f"nearest: {'; '.join(near)}. Keep the node there (keep = [...] in the [body] of its job, keep= in "
                 "Python), name one of these, or allow a greater distance by tolerance"
             )

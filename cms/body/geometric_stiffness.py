@@ -27,7 +27,7 @@ SPIN_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class RotatedLoads:
-    """K_j between a rotation of the whole body and a mode: work on mode k of the balanced load j as it rotates too.
+    """K_j between a rotation of the whole body and a mode: work on mode k of the balanced load j rotated with the body.
 
     It is (e_x × c)ᵀ K_geo(sigma_j) phi_k for rotations about the axes x of B. With it, K_j is transformed to the shapes
     of another frame, phi - Psi_R C. For translations it is zero, and for two rotations it follows from the load.
@@ -130,7 +130,7 @@ class GeometricStiffness:
         if self.spread is not None:
             require_shape("spread loads: K", self.spread.K, (6, n, n))
             if self.turned is None:
-                raise BodyError("spread loads: without the turned loads, with which they go to another frame")
+                raise BodyError("spread loads: expected turned loads too, which their change of frame needs")
 
     @property
     def n_q(self) -> int:
@@ -170,7 +170,7 @@ class GeometricStiffness:
     def in_units(self, old: Units, new: Units) -> "GeometricStiffness":
         """Return the same matrices in other units; qᵀ K_j q times the load amplitude is an energy."""
         length, mass = old.length / new.length, old.mass / new.mass
-        q = np.sqrt(mass) * length  # factor on a matrix for each mode index fewer
+        q = np.sqrt(mass) * length  # factor for each index of a mode that a matrix has less than two
         force = 1 / (mass * length)  # factor on the mode-mode matrix of a unit force
         of_wrench = force * np.array([1.0, 1, 1, 1 / length, 1 / length, 1 / length])[:, None, None]
         by_load = {"translation": 1 / length, "rotation": 1.0, "spin": 1.0, "interfaces": of_wrench}

@@ -97,8 +97,8 @@ class Moments:
     def negativity(self) -> float:
         """Smallest eigenvalue of the Gram matrix about the centre of mass, divided by the largest, if negative; else 0.
 
-        The matrix is scaled to a unit diagonal. That of masses has no negative eigenvalue; an inertia without a
-        distribution of its mass has, such as that of bars without rotary inertia of bending.
+        The matrix is scaled to a unit diagonal. The Gram matrix of a mass distribution has no negative eigenvalue. The
+        inertia of some models, such as bars without rotary inertia of bending, has no mass distribution.
         """
         L = np.eye(4 + 3 * self.n_q)
         L[1:4, 0] = -self.center_of_mass
@@ -156,8 +156,8 @@ class Moments:
         if missing:
             raise BodyError(
                 f"moments: {', '.join(missing)} of this body {'is' if len(missing) == 1 else 'are'} missing: the "
-                "program that reduced it did not say them, and they do not follow from reduced matrices. Import the "
-                "body again with its full mass matrix, its nodal masses, or its mesh and density beside (cms import)"
+                "program that reduced it did not write them, and they do not follow from reduced matrices. Import the "
+                "body again and also give its full mass matrix, nodal masses, or mesh and density (cms import)"
             )
 
     @property
@@ -237,7 +237,7 @@ def moments_from_gram(gram: Array, *, is_exact: bool = True, missing: tuple[str,
     Parameters
     ----------
     gram
-        (4 + 3 n_q, 4 + 3 n_q); components of all shapes are grouped: all x, then all y, then all z.
+        Gram matrix, (4 + 3 n_q, 4 + 3 n_q); components of all shapes are grouped: all x, then all y, then all z.
     is_exact, missing
         As in `Moments`.
     """
@@ -269,7 +269,7 @@ def moments_from_gram(gram: Array, *, is_exact: bool = True, missing: tuple[str,
 class NodalSums:
     """Sums over all nodes with weights w, about the origin of a frame B; only translations count.
 
-    They are the parts of [1, c]ᵀ W [1, c, Phi] that a frame needs to compute the C of least weighted deformation.
+    They are the parts of [1, c]ᵀ W [1, c, Phi] from which a Buckens frame computes the rigid motion C that it removes.
     """
 
     w: float  #: sum of the weights [m³, or dimensionless if all nodes have equal weight]

@@ -15,9 +15,9 @@ from fe_models.foundation.words import nearest, quoted
 __all__ = ["SOURCES", "KeptPoints"]
 
 SOURCES = {
-    "dofs": "rotations that are dofs of the model, as of beams and shells",
-    "elements": "half the curl of the displacement, by the elements at the node, as of solids",
-    "unknown": "not known: bare matrices and rods without rotations",
+    "dofs": "rotations that are dofs of the model, as for beams and shells",
+    "elements": "half the curl of the displacement in the elements at the node, as for solids",
+    "unknown": "unknown: bare matrices and rods without rotations",
 }  #: origins of the rotations of a point
 
 

@@ -13,14 +13,14 @@ class Limits:
     rotation: float  #: largest elastic rotation of an interface in the body frame [rad]
     #: relative change of stiffness due to loads; for a stiffened body: loads divided by the first buckling load
     load: float
-    speed: float  #: largest angular speed over the lowest angular frequency of the body with one of its joints fixed
+    speed: float  #: largest ratio of angular speed to the lowest angular frequency with one of the joints fixed
     inertia: float = inf  #: largest such speed ratio for a body whose unknown inertia terms are neglected
 
 
-#: for a linear frame: its strain error is the square of the rotation, its stiffness error the neglected change by loads
+#: for a linear frame: the strain error is the square of the rotation, the stiffness error is the change due to loads
 LINEAR = Limits(rotation=0.1, load=0.1, speed=0.2)
-#: with second-order terms, the error grows with the third power of the rotation; near buckling a body bends far
+#: with second-order terms: the error grows with the third power of the rotation; near buckling deformation is large
 STIFFENED = Limits(rotation=0.3, load=0.7, speed=3.5)
 
-#: its square is the deformation by centrifugal loads, relative to the body size, which a body without 3C lacks
+#: largest speed ratio without 3C; its square is the neglected centrifugal deformation relative to the body size
 LEFT_OUT = 0.1

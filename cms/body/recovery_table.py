@@ -5,8 +5,8 @@ With z = (d, theta, q): the small displacement and rotation of B in axes of B, a
     y = D_0 z + D_1 dz/dt + D_2 d²z/dt² + L p
 
 where D_k is `dynamic[k]`, L is `static`, and p are the amplitudes of the loads named in `loads`. For a stress or a
-force, D_0 is the mode displacement method. D_2 and L then add the static response to inertia and loads that the modes
-lack. Together they are the mode acceleration method (docs/theory.md §11).
+force, D_0 is the mode displacement method. D_2 and L add the static response to inertia and loads outside the modes.
+Together they are the mode acceleration method (docs/theory.md §11).
 """
 
 from collections.abc import Sequence
@@ -94,7 +94,7 @@ class RecoveryTable:
         for what, words in (("label", self.labels), ("load", self.loads)):
             if len(set(words)) != len(words):
                 twice = next(word for k, word in enumerate(words) if word in words[:k])
-                raise BodyError(f"{where}: two rows or columns have the {what} {twice!r}; ask for each once")
+                raise BodyError(f"{where}: two rows or columns have the {what} {twice!r}; request each only once")
 
     @property
     def n_rows(self) -> int:
@@ -124,14 +124,14 @@ class RecoveryTable:
         Parameters
         ----------
         z, z_dot, z_ddot
-            (..., 6 + n_q).
+            Coordinates and their time derivatives, (..., 6 + n_q).
         p
-            (..., n_loads).
+            Load amplitudes, (..., n_loads).
 
         Returns
         -------
         Array
-            (..., n_rows).
+            Row values y, (..., n_rows).
         """
         width = N_RIGID + self.n_q
         total = 0.0
@@ -185,11 +185,12 @@ class RecoveryTable:
         Parameters
         ----------
         X
-            z = X z_new, (6 + n_q, 6 + n_q); the same for z_ddot, except for the acceleration of the origin about p_new.
+            Transformation z = X z_new, (6 + n_q, 6 + n_q). It also holds for z_ddot, except for the term of the spin in
+            the acceleration of the origin, see `p`.
         R
             New axes as columns, in old axes, (3, 3).
         p
-            New origin in the old frame, (3,) [m]; the old origin moves about it, d² = ... + omega × (omega × -p).
+            New origin in the old frame, (3,) [m]. The old origin moves about it: d_ddot = ... + omega × (omega × -p).
         """
         static = np.array(self.static)
         index = {name: k for k, name in enumerate(self.loads)}
@@ -223,7 +224,7 @@ class RecoveryTable:
 def spin_products(omega: Array) -> Array:
     """Return amplitudes of the loads "spin xx yy zz xy yz zx", (..., 6), given angular velocities, (..., 3) [rad/s].
 
-    The amplitudes are omega_a omega_b; those of two different axes are doubled, because each stands for both orders.
+    The amplitudes are omega_a omega_b, doubled for two different axes, because ab and ba share one load.
 
     Parameters
     ----------

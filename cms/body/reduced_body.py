@@ -122,7 +122,7 @@ class ReducedBody:
     moments
         Moments of mass of the body and its shapes in B.
     free_frequencies
-        Elastic frequencies of the unsupported reduced body (of a held body: as held), ascending [Hz].
+        Elastic frequencies of the unsupported reduced body (for a held body: with its supports), ascending [Hz].
     nodes
         Kept nodes (surface, interfaces) in B, (n_kept, 3) [m].
     node_ids
@@ -196,7 +196,7 @@ class ReducedBody:
         put(self, "recovery", FrozenMapping(dict(self.recovery)))
         n, n_kept = self.n_q, len(self.nodes)
         if self.quadratic is not None and self.geometric is None:
-            raise BodyError(f"{where}: quadratic modes without the geometric stiffness that is their inertia")
+            raise BodyError(f"{where}: quadratic modes need the geometric stiffness, which contains their inertia")
         if self.moments.n_q != n:
             raise BodyError(f"{where}: {n} modes, but moments of {self.moments.n_q}")
         widths = {f"load case {case.name!r}: h": case.h.shape for case in self.load_cases}
@@ -216,9 +216,7 @@ class ReducedBody:
                     f"{len(self.geometric.is_loaded)}"
                 )
             if self.geometric.spread is not None and self.nodal_sums is None:
-                raise BodyError(
-                    f"{where}: loads spread over the nodes without the nodal sums that are their resultants"
-                )
+                raise BodyError(f"{where}: loads spread over the nodes need the nodal sums, which are their resultants")
         for name, table in self.recovery.items():
             widths[f"recovery {name!r}"] = (table.n_q,)
             if table.system != self.units or table.name != name:
@@ -297,9 +295,9 @@ class ReducedBody:
 
 
 def unit_findings(body: ReducedBody) -> list[tuple[bool, str]]:
-    """Return (is an error, text) for each implausible number: size, mass over hull volume, 2 f L of the first mode.
+    """Return (is an error, text) for each implausible number: size, mass / hull volume, 2 f L of the first mode.
 
-    Size and hull are those of the kept nodes, the frequency is the first of `free_frequencies`.
+    Size L and hull are computed from the kept nodes; f is the first of `free_frequencies`.
     """
     nodes, free = np.asarray(body.nodes), np.asarray(body.free_frequencies)
     numbers = BodyNumbers(

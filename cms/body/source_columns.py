@@ -65,7 +65,7 @@ class SourceColumns:
 def source_columns(labels: tuple[str, ...], groups: tuple[str, ...], A: Array, F: Array) -> SourceColumns:
     """Return the columns, with A and F of each scaled to equal size: A_c s and F_c / s with s² = |F_c| / |A_c|.
 
-    A column without forces (a rigid-body motion) contributes to no energy; both rows are then zero.
+    A column without forces (a rigid-body motion) does not contribute to any energy; both rows are then zero.
     """
     size_A, size_F = np.linalg.norm(A, axis=1), np.linalg.norm(F, axis=1)
     works = (size_A > 0) & (size_F > 0)

@@ -33,7 +33,7 @@ def von_mises(stress: Array) -> Array:
     Parameters
     ----------
     stress
-        (n, 6) or (n, 6, k).
+        Stress components, (n, 6) or (n, 6, k).
     """
     xx, yy, zz, yz, xz, xy = np.moveaxis(np.asarray(stress), 1, 0)
     normal = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2

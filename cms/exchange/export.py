@@ -74,9 +74,12 @@ WRITERS: dict[str, Writer] = {
 }  #: writer of each format, by key of `cms.exchange.exporters.formats.FORMATS`
 
 NEEDS = {
-    "modes": (lambda body: body.n_q > 0, "has no modes: it is rigid; give the other program its mass and inertia"),
-    "nodes": (lambda body: len(body.nodes) > 0, "has no nodes with shapes, of which the format is made"),
-    "interfaces": (lambda body: len(body.interfaces) > 0, "has no interfaces, whose motion the format is made of"),
+    "modes": (
+        lambda body: body.n_q > 0,
+        "has no modes, so it is rigid; enter its mass and inertia in the other program",
+    ),
+    "nodes": (lambda body: len(body.nodes) > 0, "has no nodes with shapes, which the format requires"),
+    "interfaces": (lambda body: len(body.interfaces) > 0, "has no interfaces, whose motion the format requires"),
 }  #: for each key of `Writer.needs`: test of the body, and text of the error
 
 
@@ -101,8 +104,8 @@ def unknown_format(name: str) -> str:
         return f"unknown format {quoted(name)}{nearest(name, WRITERS)}"
     near = "nastran-dmig" if program == "Adams" else "sid_fem"
     return (
-        f"{quoted(name)}: the file of {program} is not documented, so it is not written; "
-        f'{near} may serve, see "Adams and Simpack" in docs/formats.md'
+        f"{quoted(name)}: the file format of {program} is not documented, so it cannot be written; "
+        f'{near} may be an alternative, see "Adams and Simpack" in docs/formats.md'
     )
 
 
@@ -126,8 +129,8 @@ def export_body(
     to
         Key of the format, as listed by `cms formats`.
     units
-        Unit system of the numbers, or its name; default: that of the body, or the only one that the other program
-        knows. Most formats do not record their units.
+        Unit system of the numbers, or its name; default: the system of the body, or the only one that the other program
+        accepts. Most formats do not record their units.
     nodes
         Nodes in formats that allow a choice (SID_FEM, MBDyn): "interfaces", "all", or "default" for the usual choice.
     loads
@@ -136,7 +139,7 @@ def export_body(
     Returns
     -------
     exported
-        The files, and a description of what the format cannot hold of this body.
+        Written files, and a description of the data of this body that the format cannot hold.
 
     Raises
     ------
@@ -156,14 +159,16 @@ def export_body(
     if nodes not in ("default", "interfaces", "all"):
         raise ExportError(f"export: nodes = {quoted(nodes)}: expected 'interfaces' or 'all'")
     if loads and not writer.takes_loads:
-        raise ExportError(f"export: loads: {to} holds no constant loads; give them to the other program as forces")
+        raise ExportError(f"export: loads: {to} cannot hold constant loads; apply them as forces in the other program")
     converted = convert_units(body, system)
     require_content(converted, to, writer)
     request = Request(converted, with_suffix(Path(path), to), source, nodes, loads or {})
     made = writer.make(request)
     if is_stream(request.path) and list(made.files) != [request.path]:
         names = ", ".join(file.name for file in made.files)
-        raise ExportError(f"{path}: is a device or a pipe, and {to} is written in files that belong together: {names}")
+        raise ExportError(
+            f"{path}: is a device or a pipe, but {to} consists of several files: {names}; expected a file name"
+        )
     try:
         replace_files(made.files)
     except OSError as error:
@@ -176,7 +181,7 @@ def wanted_units(units: Units | str, to: str, writer: Writer) -> Units:
     system = unit_system(units) if isinstance(units, str) else units
     if writer.units and system.name != writer.units:
         raise ExportError(
-            f"export: units {system.name}: the program behind {to} knows {writer.units} only; ask for that"
+            f"export: units {system.name}: the program behind {to} accepts only {writer.units}; choose these"
         )
     return system
 
@@ -192,8 +197,8 @@ def require_content(body: ReducedBody, to: str, writer: Writer) -> None:
     where = f"export to {to}: body {body.name!r}"
     if body.is_held and not writer.takes_held:
         raise ExportError(
-            f"{where} is held to the ground, and the format is that of a body in a moving frame; reduce the body free, "
-            "and let the other program hold it by a joint"
+            f"{where} is held to the ground, but the format describes a body in a moving frame; reduce the free body, "
+            "and fix it by a joint in the other program"
         )
     for need in writer.needs:
         has, words = NEEDS[need]

@@ -136,42 +136,42 @@ def import_body(
 ) -> ReducedBody:
     """Make a reduced body from the files of another program.
 
-    Superelements (matrices over boundary dofs and modal coordinates, rigid motion inside) and bodies of floating frames
-    (modes without rigid motion, with their mass integrals) become bodies like our own. What the files do not say is
-    missing in them: `Moments.missing`, stress, geometric stiffness.
+    Superelements (matrices over boundary dofs and modal coordinates, including rigid motion) and floating-frame bodies
+    (modes without rigid motion, with their mass integrals) become reduced bodies. Data that are not in the files are
+    missing in the body: `Moments.missing`, stress, geometric stiffness.
 
     Parameters
     ----------
     files
-        A file, several of one body, or role ("K", "M", "D") -> file of matrices; or matrices that were read already.
+        A file, several files of one body, or role ("K", "M", "D") -> file of matrices; or matrices that were read.
     units
-        Of all numbers in the files: no format of these says them.
+        Units of all numbers in the files; none of these formats records them.
     name
-        Of the body; that of the first file by default.
+        Name of the body; default: the name of the first file.
     form
-        Key of `BODY_FORMATS`, or "matrices"; None: told by suffix and content.
+        Key of `BODY_FORMATS`, or "matrices"; None: determined from suffix and content.
     nodes
-        Places that the files lack: a deck or mesh with the same node numbers, or number -> place.
+        Node positions that are not in the files: a deck or mesh with the same node numbers, or number -> position.
     boundary
-        Of matrices without a list of dofs: the boundary nodes in the order of the rows, six dofs each; the rows after
-        them are modal coordinates.
+        For matrices without a list of dofs: boundary nodes in the order of the rows, six dofs each; the remaining rows
+        are modal coordinates.
     interfaces
-        Name -> node numbers; by default those of the files, or every boundary node with six dofs.
+        Interface name -> node numbers; default: the interfaces in the files, or every boundary node with six dofs.
     inertia
-        Of superelements: `FullMass`, `NodalMasses` or `MeshMass`, for 3C, 4C and 5C, which reduced matrices do not say.
+        For superelements: `FullMass`, `NodalMasses` or `MeshMass`, which give 3C, 4C and 5C; reduced matrices do not.
     frame
-        Of the body; Tisserand (mean axes) by default.
+        Body frame; default: Tisserand (mean axes).
     damping
-        Added to that of the files.
+        Damping in addition to the damping in the files.
     repair_mass
-        Whether slightly negative eigenvalues of a reduced mass are set to zero, which is told.
+        Whether to set slightly negative eigenvalues of a reduced mass to zero; a note reports this.
     accept
-        Findings to accept: "units", that size, density or wave speed are implausible.
+        Findings to accept: "units" means implausible size, density or wave speed.
 
     Raises
     ------
     ForeignBodyError
-        If a file is missing, damaged, of an unknown kind or of two bodies, or says less than a body needs.
+        If a file is missing, damaged or of unknown kind, if files belong to two bodies, or if needed data are missing.
     BodyError
         If the body is held, a mechanism, or its mass is indefinite.
     """
@@ -245,8 +245,8 @@ def of_matrices(foreign: ForeignMatrices, name: str, places: Places, boundary: S
             raise ForeignBodyError("boundary: the files list the dofs of their rows themselves; remove it")
         if not 6 * len(boundary) <= n or not len(boundary):
             raise ForeignBodyError(
-                f"boundary: {len(boundary)} nodes have {6 * len(boundary)} dofs, the matrices {n} rows; expected at "
-                "least one node, and not more dofs than rows"
+                f"boundary: {len(boundary)} nodes have {6 * len(boundary)} dofs, the matrices have {n} rows; expected "
+                "at least one node, and not more dofs than rows"
             )
         own = np.stack([np.repeat(np.asarray(boundary), 6), np.tile(np.arange(6), len(boundary))], axis=1)
         n_modes = n - len(own)

@@ -25,8 +25,8 @@ __all__ = ["FORMAT", "Contents", "body_of", "content_of", "require_same_frequenc
 
 FORMAT = "modal-file"
 SI = UNIT_SYSTEMS["m-kg-s"]
-FREQUENCY_DEFECT = 1e-9  #: largest relative difference between a stored frequency and that computed from K and M
-#: largest difference between a stored 1C-5C and that of the moments, relative to the largest entry
+FREQUENCY_DEFECT = 1e-9  #: largest relative difference between stored frequencies and those computed from K and M
+#: largest difference between stored invariants 1C-5C and those from the moments, relative to the largest entry
 INVARIANT_DEFECT = 1e-12
 #: unit loads of the geometric stiffness except those of the interfaces, which are stored with the interfaces
 OF_FRAME = UNIT_LOADS[:3]
@@ -335,7 +335,7 @@ def units_of(contents: Contents) -> Units:
     kinds = {field.name: type(getattr(SI, field.name)) for field in fields(Units)}
     units = Units(**{name: contents.attribute("/units", name, kind) for name, kind in kinds.items()})
     if UNIT_SYSTEMS.get(units.name, units) != units:
-        raise ModalFileError(f"units {units.name!r}: expected the factors of that system, got {units}")
+        raise ModalFileError(f"units {units.name!r}: expected the factors of this system, got {units}")
     return units
 
 

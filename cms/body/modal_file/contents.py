@@ -77,7 +77,9 @@ class Contents:
         count = self.attribute(group, "count", int)
         held = sum(path.startswith(f"{group}/") for path in self.content.attributes)
         if count != held:  # checked before this many paths are created
-            raise ModalFileError(f"attribute 'count' of {group}: expected {held}, as many as it holds, got {count:g}")
+            raise ModalFileError(
+                f"attribute 'count' of {group}: expected {held}, the number of its groups, got {count:g}"
+            )
         return tuple(f"{group}/{k}" for k in range(count))
 
     def has(self, group: str, name: str | None = None) -> bool:

@@ -1,8 +1,9 @@
 """The modal file: a reduced body as self-describing HDF5 (specified in docs/modal_file.md).
 
-A file reveals every change of a byte and never exists half written. There are two checks: the seal
-(fe_models/foundation/seal.py), compared before HDF5 opens the file, and the digest over all contents
-(fe_models/foundation/hdf5_file.py), which survives repacking and shows whether two files have equal contents.
+Every change of a byte in a file is detected, and a file is never half written. There are two checks: the seal
+(fe_models/foundation/seal.py) is compared before HDF5 opens the file; the digest over all contents
+(fe_models/foundation/hdf5_file.py) does not change if the file is repacked, and shows whether two files have equal
+contents.
 """
 
 import io
@@ -54,7 +55,7 @@ def write(reduced: ReducedBody, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     ModalFileError
-        If the file cannot be written, or its name says that it is another kind of file.
+        If the file cannot be written, or its suffix belongs to another kind of file.
     """
     if (suffix := Path(path).suffix.lower()) and suffix not in SUFFIXES and not is_stream(Path(path)):
         raise ModalFileError(
@@ -88,7 +89,7 @@ def read(path: str | os.PathLike[str], *, units: Units | str | None = None) -> R
     path
         File of this version or an older one.
     units
-        Unit system of the numbers, or its name; default: that of the file.
+        Unit system of the numbers, or its name; default: the units of the file.
 
     Raises
     ------
@@ -112,8 +113,7 @@ def read(path: str | os.PathLike[str], *, units: Units | str | None = None) -> R
 def convert_units(reduced: ReducedBody, units: Units | str) -> ReducedBody:
     """Return the same body in other units; the body itself if it already has these units.
 
-    q has the unit mass^(1/2) length, so modal coordinates, such as initial values, are different numbers in other
-    units.
+    q has the unit mass^(1/2) length, so the numerical values of modal coordinates, such as initial values, change too.
 
     Parameters
     ----------

@@ -34,7 +34,7 @@ class NodeList:
             return found
         return (
             *found,
-            "rotations are known at interfaces, at members of rigid ones and at nodes that are kept with them; those "
+            "rotations are known at interfaces, at members of rigid interfaces and at nodes kept with rotations; those "
             f"of {unknown} other nodes are written as zero: attach frames to the nodes of the interfaces",
         )
 
@@ -96,8 +96,8 @@ def all_nodes(body: ReducedBody) -> NodeList:
 def user_numbers(body: ReducedBody, n_more: int = 0, *, most: int = MOST) -> tuple[IntArray, tuple[str, ...]]:
     """Return numbers for the kept nodes and for n_more further points, and notes about their origin.
 
-    These are the user's numbers if each kept node has its own; nodes without one (reference points) follow the largest.
-    Otherwise the numbers are 1, 2, ..., and a note says so.
+    These are the user's numbers if they are unique; nodes without number (reference points) get the next numbers after
+    the largest. Otherwise the numbers are 1, 2, ..., and a note says so.
 
     Parameters
     ----------
@@ -113,10 +113,10 @@ def user_numbers(body: ReducedBody, n_more: int = 0, *, most: int = MOST) -> tup
     named = own[is_named]
     if len(np.unique(named)) < len(named):
         why = "instances" if body.numbering.instances else "nodes and the points of their skin"
-        return plain, (f"nodes are numbered 1, 2, ...: {why} share numbers of the mesh",)
+        return plain, (f"nodes are numbered 1, 2, ..., because {why} share numbers of the mesh",)
     n_free = int((~is_named).sum()) + n_more
     if not len(named) or named.min() < 1 or named.max() + n_free > most:
-        return plain, (f"nodes are numbered 1, 2, ...: those of the mesh are not from 1 to {most - n_free}",)
+        return plain, (f"nodes are numbered 1, 2, ..., because mesh numbers are not within 1 to {most - n_free}",)
     numbers = np.concatenate([own, np.full(n_more, NONE)])
     numbers[numbers == NONE] = named.max() + 1 + np.arange(n_free)
     return numbers, ("numbers of nodes are those of the mesh",)

@@ -1,8 +1,9 @@
 """Rows for element forces and stresses of a superelement from another program, with names of this project.
 
-Nastran numbers the items of an element force or stress by its output record, in whose order they stand below. Types
-that are not here have a record of several places (beams with stations, shells with corners), or one item that is a
-force or a moment (scalar springs and dampers, where the rows do not say which): they have no unit, and are left out.
+Nastran numbers the items of an element force or stress by their position in the output record; the lists below have the
+same order. Other element types are left out, because the units of their items are unknown: their record has several
+positions (beams with stations, shells with corners), or one item that may be a force or a moment (scalar springs and
+dampers).
 """
 
 from collections.abc import Mapping
@@ -88,7 +89,7 @@ def force_rows(elements: IntArray, matrix: Array) -> tuple[ForeignRows, tuple[st
     elements
         (type, id, item from 1) of each row, (n_rows, 3).
     matrix
-        (n_rows, n_dof).
+        Factors of the dofs, (n_rows, n_dof).
     """
     counts = {
         (int(kind), int(number)): int(n)
@@ -117,16 +118,16 @@ def why_lost(kind: int) -> str:
     """Return why the rows of an element type are omitted."""
     if kind in SCALAR:
         return "each is a force or a moment, and the file does not say which"
-    return "the order of their forces and moments is not known"
+    return "the order of their forces and moments is unknown"
 
 
 def stress_rows(elements: IntArray, matrix: Array) -> ForeignRows:
-    """Return the element stresses, numbered by item; arguments as of `force_rows`."""
+    """Return the element stresses, numbered by item; arguments as for `force_rows`."""
     names = tuple(
         RowName("element stress", "element", number, str(number), f"item {item}", STRESS)
         for _, number, item in elements.tolist()
     )
-    return ForeignRows(names, matrix, "Nastran's items, numbered from 1; all are taken for stresses")
+    return ForeignRows(names, matrix, "Nastran's items, numbered from 1; all are assumed to be stresses")
 
 
 def motion_rows(dofs: IntArray, matrix: Array) -> ForeignRows:

@@ -28,7 +28,7 @@ __all__ = [
 ]  # fmt: skip
 
 EXACT = 1e-6  #: relative difference between quantities from two routes, up to which they agree
-#: the same, beyond which these are two bodies; lumping moves the second moment of a coarse mesh by some per cent
+#: relative differences beyond which the data belong to two bodies; lumping changes second moments by some per cent
 OTHER_BODY = {"mass": 0.02, "first moment": 0.1, "second moment": 0.1}
 
 #: function from (node number, component) rows to shapes in basic axes, (n_rows, n_q)
@@ -105,7 +105,7 @@ def full_mass_of(foreign: ForeignMatrices) -> FullMass:
     """
     if foreign.M is None or foreign.dofs is None:
         what = "M" if foreign.M is None else "the list of dofs of its rows"
-        raise ForeignBodyError(f"full mass: {what} is missing; give the file that holds it too")
+        raise ForeignBodyError(f"full mass: {what} is missing; also give the file that contains it")
     places = {}
     if foreign.nodes is not None and foreign.node_numbers is not None:
         places = dict(zip(map(int, foreign.node_numbers), np.asarray(foreign.nodes), strict=True))
@@ -120,19 +120,19 @@ def moments_of_masses(
     Parameters
     ----------
     shapes
-        Of the body, without rigid motion, in basic axes.
+        Shapes of the body, without rigid motion, in basic axes.
     places
-        Node number -> place of all nodes of the superelement.
+        Node number -> position, for all nodes of the superelement.
 
     Raises
     ------
     ForeignBodyError
-        If a node with mass is not recovered, or its place is another one.
+        If a node with mass is not recovered, or has another position.
     """
     if isinstance(inertia, NodalMasses):
         numbers, mass = np.asarray(inertia.node_numbers), np.asarray(inertia.masses, dtype=float)
         if len(numbers) != len(mass) or not len(mass) or not np.isfinite(mass).all() or (mass < 0).any():
-            raise ForeignBodyError("nodal masses: expected a number of a node and a mass above zero in each row")
+            raise ForeignBodyError("nodal masses: expected a node number and a mass above zero in each row")
         known = {int(number) for number in places}
         lost = [int(number) for number in numbers if int(number) not in known]
         if lost:
@@ -162,7 +162,7 @@ def gram_of_full_mass(
     numbers = np.unique(inertia.dofs[:, 0])
     lost = [int(number) for number in numbers if int(number) not in inertia.places and int(number) not in places]
     if lost:
-        raise ForeignBodyError(f"full mass: nodes {lost[:6]} have no place; give their positions")
+        raise ForeignBodyError(f"full mass: nodes {lost[:6]} have no position; give their positions")
     index = {int(number): k for k, number in enumerate(numbers)}
     dofs = np.stack([np.array([index[int(number)] for number in inertia.dofs[:, 0]]), inertia.dofs[:, 1]], axis=1)
     nodes = np.array([inertia.places.get(int(number), places.get(int(number))) for number in numbers])
@@ -184,8 +184,8 @@ def gram_of_mesh(inertia: MeshMass, shapes: Shapes, places: Mapping[int, Array],
         if far.max() > 1e-3 * size:
             at = int(numbers[common[int(np.argmax(far))]])
             raise ForeignBodyError(
-                f"mesh {mesh.source}: node {at} is {far.max():.3g} away from where the superelement has it; is it the "
-                "mesh behind it, in the same units and axes?"
+                f"mesh {mesh.source}: node {at} is {far.max():.3g} away from its position in the superelement; "
+                "expected the mesh from which the superelement was made, in the same units and axes"
             )
     density = inertia.density if isinstance(inertia.density, Mapping) else {"": inertia.density}
     materials = {
@@ -214,7 +214,7 @@ def completed(known: Moments, other: Moments, what: str) -> tuple[Moments, str]:
     Raises
     ------
     ForeignBodyError
-        If both are not of one body.
+        If the two belong to different bodies.
     """
     length = float(np.sqrt(np.trace(known.R) / known.m)) or 1.0
     size = np.sqrt(known.m)
@@ -230,8 +230,8 @@ def completed(known: Moments, other: Moments, what: str) -> tuple[Moments, str]:
              if not by_name[name] <= most]  # fmt: skip
     if wrong:
         raise ForeignBodyError(
-            f"{what}: they are not of this body: {', '.join(wrong)} (mass {other.m:.6g} where the reduced mass matrix "
-            f"says {known.m:.6g}); look for units, a part that is missing, or another model"
+            f"{what}: they do not belong to this body: {', '.join(wrong)} (mass {other.m:.6g}, in the reduced mass "
+            f"matrix {known.m:.6g}); check units, missing parts, or whether the model is another one"
         )
     whole = replace(known, missing=())
     P = np.asarray(other.P)

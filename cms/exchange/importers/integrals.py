@@ -10,7 +10,7 @@ __all__ = ["moments_of_invariants"]
 
 EPSILON = np.cross(np.eye(3)[:, None], np.eye(3)[None])  #: (a × b)_c = EPSILON_abc a_a b_b, (3, 3, 3)
 CONSISTENT = 1e-6  #: relative difference between two values of one invariant, up to which it is rounding in the file
-ROUGH = 0.1  #: the same difference, up to which the moment of the mass matrix is used and a note is written
+ROUGH = 0.1  #: relative difference up to which the value from the mass matrix is used, with a note
 
 
 def moments_of_invariants(
@@ -29,24 +29,24 @@ def moments_of_invariants(
     """Return the moments in a file, and notes on data that the file contains twice.
 
     (1) R = ½ tr(J0) 1 - J0
-    (2) P_k = ½ tr(3C_k) 1 - 3C_kᵀ, its antisymmetric part by 2C
-    (3) S_ab,kl: trace by the modal mass, the part antisymmetric in a, b by 4C, the rest by 5C, S_lk = M_kl 1 - 5C_kl;
-        the antisymmetric part of 5C_kl is tilde(4C_kl) / 2
-    (4) what is None is missing
+    (2) P_k = ½ tr(3C_k) 1 - 3C_kᵀ, its antisymmetric part from 2C
+    (3) S_ab,kl: trace from the modal mass, the part antisymmetric in a, b from 4C, the rest from 5C,
+        S_lk = M_kl 1 - 5C_kl; the antisymmetric part of 5C_kl is tilde(4C_kl) / 2
+    (4) an argument of None marks the term as missing
 
     Parameters
     ----------
     C1, C2
-        (3, n_q).
+        Invariants 1C and 2C, (3, n_q) each.
     M
         Modal mass, (n_q, n_q).
     C3, C4, C5
-        (n_q, 3, 3), (n_q, n_q, 3), (n_q, n_q, 3, 3).
+        Invariants 3C, 4C and 5C, (n_q, 3, 3), (n_q, n_q, 3) and (n_q, n_q, 3, 3).
 
     Raises
     ------
     ForeignBodyError
-        If two statements of one thing differ by more than a lumped mass explains.
+        If two values of one quantity differ by more than a lumped mass explains.
     """
     n = M.shape[0]
     notes: list[str] = []
@@ -68,7 +68,7 @@ def moments_of_invariants(
         S_kl -= np.einsum("abc,klc->abkl", EPSILON, C4) / 2
     if C5 is not None:
         if C4 is None:
-            raise ForeignBodyError(f"{where}: 5C is there and 4C, which is a part of it, is not")
+            raise ForeignBodyError(f"{where}: the file has 5C but not 4C, which is a part of it")
         of_C5 = np.trace(C5, axis1=2, axis2=3) / 2
         compare(where, notes, "the modal mass and the trace of 5C", of_C5, M, size)
         turning = -np.einsum("abc,klc->klab", EPSILON, C4) / 2
@@ -92,8 +92,10 @@ def compare(where: str, notes: list[str], what: str, found: Array, expected: Arr
     defect = float(np.abs(found - expected).max(initial=0.0))
     if not defect <= ROUGH * size:
         raise ForeignBodyError(
-            f"{where}: {what} differ by {defect / size if size else np.inf:.1e}: expected two words for one integral; "
-            "indices are in another order, a sign is another one, or the file is of two models"
+            f"{where}: {what} differ by {defect / size if size else np.inf:.1e}: expected equal values; the "
+            "order of indices or a sign is different, or the file mixes two models"
         )
     if defect > CONSISTENT * size:
-        notes.append(f"{what} differ by {defect / size:.1e}: lumped masses beside consistent ones; the first is taken")
+        notes.append(
+            f"{what} differ by {defect / size:.1e}: one is from lumped, one from consistent masses; the first is used"
+        )

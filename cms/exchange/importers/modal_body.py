@@ -86,7 +86,9 @@ class ModalBody:
         n, n_nodes = len(self.K), len(self.node_numbers)
         object.__setattr__(self, "provenance", FrozenMapping(dict(self.provenance)))
         if not n:
-            raise ForeignBodyError(f"{where}: expected at least one mode, got none; a rigid body needs no file")
+            raise ForeignBodyError(
+                f"{where}: expected at least one mode, got none; a rigid body does not need this file"
+            )
         if len(np.unique(self.node_numbers)) != n_nodes:
             raise ForeignBodyError(f"{where}: node_numbers: a number is there twice")
         if self.moments.n_q != n:
@@ -127,19 +129,20 @@ FEW = 12  #: largest number of nodes with rotations that become interfaces if no
 def body_of_modes(body: ModalBody, options: ImportOptions) -> ReducedBody:
     """Convert a foreign modal body.
 
-    (1) the integrals and the modal mass are of one body: M* = M
-    (2) K z = omega² M z: M-orthonormal, K-diagonal modes; none of them a rigid-body motion
-    (3) everything linear in the modes over the new ones
-    (4) the frame: if no mode carries momentum it is that of mean axes already, else it is made so, or as asked for
+    (1) check that integrals and modal mass belong to one body: M* = M
+    (2) solve K z = omega² M z for M-orthonormal, K-diagonal modes; none of them may be a rigid-body motion
+    (3) transform all data that are linear in the modes to the new modes
+    (4) choose the frame: if no mode has momentum, it already is the frame of mean axes; otherwise the body is converted
+        to mean axes, or to the requested frame
 
     Raises
     ------
     ForeignBodyError
-        If the file does not say one thing, a rigid-body motion is among its modes, or an interface is unknown.
+        If the file contradicts itself, a rigid-body motion is among its modes, or an interface is unknown.
     """
     where = f"body {body.name!r}"
     if options.inertia is not None:
-        raise ForeignBodyError(f"{where}: has its own mass integrals; masses beside are for superelements")
+        raise ForeignBodyError(f"{where}: has its own mass integrals; additional masses are only for superelements")
     require_one_body(where, body)  # (1)
     stiffness, mass = np.diag(body.K), np.diag(body.M)
     if (mass <= 0).all() or not (stiffness > 0).any():
@@ -154,8 +157,8 @@ def body_of_modes(body: ModalBody, options: ImportOptions) -> ReducedBody:
     free = int((omega2 <= NO_ENERGY * omega2.max()).sum())
     if free:
         raise ForeignBodyError(
-            f"{where}: {free} of its modes cost no energy: a rigid-body motion is among them, or a mechanism; a body "
-            "of a floating frame has neither: write it without rigid-body modes"
+            f"{where}: {free} of its modes have no energy: a rigid-body motion or a mechanism is among them; a "
+            "floating-frame body must have neither: write it without rigid-body modes"
         )
     Z = Z @ orientation((np.asarray(body.Phi) @ Z).reshape(-1, body.n_q), omega2)
     moments = changed(body.moments, Z)  # (3)
@@ -204,7 +207,7 @@ def body_of_modes(body: ModalBody, options: ImportOptions) -> ReducedBody:
     if options.frame is None and in_mean_axes:  # (4)
         return reduced
     if body.geometric is not None and not in_mean_axes:
-        log.warning("%s: its geometric stiffness is that of a frame which the file does not name: left out", where)
+        log.warning("%s: its geometric stiffness belongs to a frame that the file does not name: left out", where)
     return convert_frame(reduced, options.frame or TisserandFrame())
 
 
@@ -224,8 +227,8 @@ def geometric_at(
         return None
     if any(len(interface.members) != 1 for interface in interfaces):
         log.warning(
-            "%s: its geometric stiffness is known for loads on single nodes, and an interface is none: left out; name "
-            "interfaces of one node each",
+            "%s: its geometric stiffness is known for loads on single nodes, but an interface has several: left out; "
+            "name interfaces of one node each",
             where,
         )
         return None
@@ -254,8 +257,8 @@ def require_one_body(where: str, body: ModalBody) -> None:
     defect, size = np.abs(body.moments.M - body.M).max(), np.abs(body.M).max()
     if not defect <= ONE_BODY * size:
         raise ForeignBodyError(
-            f"{where}: the integrals of the shape functions are not those of its modal mass: sum of S_aa and M "
-            f"differ by {defect / size:.1e} of M; indices may be in another order, or the file is of two models"
+            f"{where}: the integrals of the shape functions do not agree with the modal mass: sum of S_aa and M "
+            f"differ by {defect / size:.1e} of M; indices may be in another order, or the file mixes two models"
         )
 
 
@@ -285,7 +288,7 @@ def interfaces_of(where: str, body: ModalBody, options: ImportOptions) -> Sequen
         return body.interfaces
     if body.rotations is not None and len(body.nodes) <= FEW:
         return [ForeignInterface(f"node {number}", np.array([number])) for number in body.node_numbers]
-    log.warning("%s: names no interfaces: joints need some; name nodes (--interface NAME=3,11)", where)
+    log.warning("%s: has no interfaces, which joints need; name nodes (--interface NAME=3,11)", where)
     return []
 
 

@@ -14,7 +14,7 @@ from fe_models.foundation.records import FrozenMapping, frozen_copies
 __all__ = ["RecoveryRows", "Superelement", "superelement_of_matrices"]
 
 LARGEST = 20_000  #: largest number of rows of a dense matrix (3 GB each)
-TRIANGLE = 1e-8  #: |A - Aᵀ| over |A| up to which it is rounding
+TRIANGLE = 1e-8  #: largest |A - Aᵀ| / |A| that counts as rounding
 
 
 @frozen_copies
@@ -42,7 +42,7 @@ class Superelement:
     Raises
     ------
     ForeignBodyError
-        If shapes do not fit, a matrix is not finite or not symmetric, or a node has no place.
+        If shapes do not fit, a matrix is not finite or not symmetric, or a node has no position.
     """
 
     name: str
@@ -75,7 +75,7 @@ class Superelement:
                 put(self, name, frozen(checked_matrix(f"{where}: {name}", np.asarray(matrix, dtype=float), n)))
         if self.nodes.shape != (len(self.node_numbers), 3) or not np.isfinite(self.nodes).all():
             raise ForeignBodyError(
-                f"{where}: nodes: expected a finite place, (x, y, z), for each of {len(self.node_numbers)} numbers, "
+                f"{where}: nodes: expected a finite position (x, y, z) for each of {len(self.node_numbers)} numbers, "
                 f"got shape {self.nodes.shape}"
             )
         require_unique(f"{where}: node_numbers", self.node_numbers)
@@ -100,8 +100,8 @@ class Superelement:
         lost = np.setdiff1d(np.concatenate(placed), self.node_numbers)
         if len(lost):
             raise ForeignBodyError(
-                f"{where}: nodes {listed(lost)} have dofs and no place: the files do not say where they are; give "
-                "their positions (nodes = a table of number, x, y, z, or a mesh or deck that has these numbers)"
+                f"{where}: nodes {listed(lost)} have dofs but no position in the files; give their positions "
+                "(nodes = a table of number, x, y, z, or a mesh or deck that has these numbers)"
             )
 
     @property
@@ -126,7 +126,7 @@ def checked_matrix(where: str, matrix: Array, n: int) -> Array:
     defect, size = np.abs(matrix - matrix.T).max(), np.abs(matrix).max()
     if defect > TRIANGLE * size:
         triangle = min(np.abs(np.tril(matrix, -1)).max(initial=0.0), np.abs(np.triu(matrix, 1)).max(initial=0.0))
-        hint = "; one triangle is zero: a symmetric matrix was written by half" if triangle == 0 else ""
+        hint = "; one triangle is zero: only half of a symmetric matrix was written" if triangle == 0 else ""
         raise ForeignBodyError(f"{where}: expected a symmetric matrix, |A - Aᵀ| is {defect / size:.1e} of |A|{hint}")
     return np.asarray((matrix + matrix.T) / 2)
 
@@ -153,7 +153,7 @@ def superelement_of_matrices(
     foreign
         Stiffness and mass with the dofs of their rows.
     places
-        Node number -> place, of nodes that the files do not place; they must not say another one.
+        Node number -> position, for nodes without position in the files; other positions must agree with the files.
 
     Raises
     ------
@@ -163,7 +163,7 @@ def superelement_of_matrices(
     where = f"superelement {name!r}"
     for role in ("K", "M"):
         if getattr(foreign, role) is None:
-            raise ForeignBodyError(f"{where}: {role} is missing; give the file that holds it too")
+            raise ForeignBodyError(f"{where}: {role} is missing; also give the file that contains it")
     if foreign.dofs is None:
         raise ForeignBodyError(
             f"{where}: the files do not say which dof each row is; give the file that lists them too (.asm or .pch of "

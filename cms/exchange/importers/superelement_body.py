@@ -33,10 +33,10 @@ from fe_models.meshes.numbering import Numbering
 
 __all__ = ["ImportOptions", "body_of_superelement", "fe_body_of_superelement"]
 
-#: largest error of recovered nodes in a rigid motion, over the size of the motion, due to digits of the file
+#: largest error of recovered nodes in a rigid motion, relative to the motion, due to the limited digits of the file
 RIGID = 1e-5
 UNCOUPLED = 1e-9  #: scaled coupling between modal coordinates and boundary in K, below which it is rounding
-ROUNDING = 1e-13  #: stiffness of a boundary dof over the largest entry, below which it is rounding
+ROUNDING = 1e-13  #: stiffness of a boundary dof relative to the largest entry, below which it is rounding
 COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz")
 
 
@@ -57,15 +57,17 @@ class ImportOptions:
 def body_of_superelement(element: Superelement, options: ImportOptions) -> ReducedBody:
     """Reduce a superelement to a body in a floating frame.
 
-    (1) the body of its matrices: boundary dofs, modal coordinates as dofs without place, recovered nodes (`FEBody`)
-    (2) the gates of bare matrices: free, mass positive, units plausible; recovered nodes follow a rigid motion
-    (3) its unit columns as a mode set, finished as every other: frame, rank, M-orthonormal, K-diagonal (theory.md §3)
-    (4) m, S, R, 1C, 2C, M* from the reduced mass; 3C, 4C, 5C from what is given beside, or missing (theory.md §5)
+    (1) make an `FEBody` of its matrices: boundary dofs, modal coordinates as dofs without position, recovered nodes
+    (2) check it like bare matrices: free, positive mass, plausible units; recovered nodes must follow a rigid motion
+    (3) take its unit columns as a mode set, and apply the finishing step: frame, rank, M-orthonormal, K-diagonal
+        (theory.md §3)
+    (4) compute m, S, R, 1C, 2C, M* from the reduced mass; 3C, 4C, 5C from additional data, otherwise they are missing
+        (theory.md §5)
 
     Raises
     ------
     ForeignBodyError
-        If the superelement does not fit together, or what is given beside is of another body.
+        If the superelement is inconsistent, or additional data belong to another body.
     BodyError
         If it is held, a mechanism, or its mass is indefinite.
     """
@@ -108,7 +110,7 @@ def body_of_superelement(element: Superelement, options: ImportOptions) -> Reduc
 def tables_of(element: Superelement, body: FEBody, Phi: Array, reduced: ReducedBody) -> dict[str, RecoveryTable]:
     """Return the additional rows of a superelement over z = (d, theta, q); they are exact in its span.
 
-    The files say what x is there, x = T x' with x' the dofs of the body (`static_part`).
+    The rows in the files refer to x = T x', where x' are the dofs of the body (`static_part`).
     """
     tables: dict[str, RecoveryTable] = {}
     if not element.tables:
@@ -128,14 +130,14 @@ def tables_of(element: Superelement, body: FEBody, Phi: Array, reduced: ReducedB
 def fe_body_of_superelement(element: Superelement, options: ImportOptions) -> FEBody:
     """Return the body of a superelement: its matrices in Craig-Bampton form, its nodes, interfaces and loads.
 
-    Modal coordinates that the stiffness couples to the boundary are measured from their static answer to it,
-    x_q = x_q' - K_qq⁻¹ K_qb u_b, so that a rigid motion of the boundary is one of the body.
+    If the stiffness couples modal coordinates to the boundary, they are measured relative to their static response,
+    x_q = x_q' - K_qq⁻¹ K_qb u_b. A rigid motion of the boundary then is a rigid motion of the body.
     """
     where = f"superelement {element.name!r}"
     node = np.zeros(len(element.dofs), np.int64)
     physical = ~element.is_modal
     if not physical.any():
-        raise ForeignBodyError(f"{where}: expected dofs of boundary nodes, got modal coordinates alone")
+        raise ForeignBodyError(f"{where}: expected dofs of boundary nodes, got only modal coordinates")
     node[physical] = element.places(element.dofs[physical, 0])
     node[element.is_modal] = node[physical][0]
     dofs = np.stack([node, element.dofs[:, 1]], axis=1)
@@ -191,8 +193,8 @@ def static_part(element: Superelement, where: str) -> Array:
     values = la.eigvalsh(K_qq / np.outer(size[q], size[q])) if (size[q] > 0).all() else np.zeros(1)
     if not values[0] > 1e-10:
         raise ForeignBodyError(
-            f"{where}: modal coordinates are coupled to the boundary by stiffness, and some have none of their own; "
-            "expected modes with the boundary held (Craig-Bampton), or others that cost energy"
+            f"{where}: stiffness couples modal coordinates to the boundary, but some of them have no stiffness "
+            "themselves; expected modes with the boundary held (Craig-Bampton), or other modes with strain energy"
         )
     T[np.ix_(q, b)] = -np.linalg.solve(K_qq, K_qb)
     return T
@@ -212,7 +214,7 @@ def further_rows(element: Superelement, where: str) -> RecoveryRows:
         if np.abs(recovery.matrix[row] - expected).max() > RIGID:
             raise ForeignBodyError(
                 f"{where}: recovery: node {recovery.dofs[row, 0]} is a boundary node, and its row for component "
-                f"{recovery.dofs[row, 1]} is not that dof; are rows of matrices and recovery in one order and axes?"
+                f"{recovery.dofs[row, 1]} is not that dof; expected recovery rows in the order and axes of the matrices"
             )
     if len(np.unique(keys)) != len(keys):
         raise ForeignBodyError(f"{where}: recovery: a dof has two rows")
@@ -223,7 +225,7 @@ def further_rows(element: Superelement, where: str) -> RecoveryRows:
 def has_no_rotation(recovery: RecoveryRows) -> np.ndarray:
     """Return whether a row is a rotation of a node with zero rotations, such as a node of solid elements.
 
-    A node that has rotations turns with a rigid motion of the boundary, so that none of its rows is zero.
+    A node that has rotations rotates in a rigid motion of the boundary, so none of its rows is zero.
     """
     rotation = recovery.dofs[:, 1] >= 3
     moving = np.unique(recovery.dofs[rotation & recovery.matrix.any(axis=1), 0])
@@ -235,8 +237,9 @@ def interfaces_of(
 ) -> tuple[Interface, ...]:
     """Return the interfaces of boundary nodes, already coupled.
 
-    By default each node with six dofs is one, named "node 11", and nodes with translations are together one,
-    "boundary". Each boundary dof has to be in one: what is in none could not be joined, nor be told from a mode.
+    By default each node with six dofs is an interface, named "node 11", and all nodes with translations form one
+    interface, "boundary". Each boundary dof must belong to an interface; otherwise it could not be joined, and could
+    not be distinguished from a modal coordinate.
     """
     where = f"superelement {element.name!r}"
     boundary = np.unique(element.dofs[~element.is_modal, 0])
@@ -287,8 +290,7 @@ def require_rigid_recovery(body: FEBody, element: Superelement) -> None:
         number, component = element.node_numbers[body.recovery.dofs[row, 0]], body.recovery.dofs[row, 1]
         raise ForeignBodyError(
             f"superelement {element.name!r}: recovery: node {number}, {COMPONENTS[component]}, misses a rigid "
-            f"motion of the boundary by {defect.max():.1e} of it; are its rows in the axes of a "
-            "local coordinate system, or its place another one?"
+            f"motion of the boundary by {defect.max():.1e} of it; expected rows in basic axes and the correct position"
         )
 
 
@@ -333,9 +335,9 @@ class RecoveredShapes:
         if not is_there.all():
             lost = np.unique(dofs[~is_there, 0])
             raise ForeignBodyError(
-                f"superelement {self.element.name!r}: nodes {listed(lost)} have mass, and the files do not say how "
-                "they move: their recovery rows are missing (Nastran: displacements of all nodes in mug1); ask the "
-                "other program for them, or give masses at nodes that it recovers"
+                f"superelement {self.element.name!r}: nodes {listed(lost)} have mass, but the files have no recovery "
+                "rows for them (Nastran: displacements of all nodes in mug1); write these rows in the other program, "
+                "or give masses at nodes that it recovers"
             )
         return np.asarray((self.body.recovery.matrix @ self.Phi)[order[at]])
 

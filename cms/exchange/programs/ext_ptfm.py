@@ -37,7 +37,7 @@ def make_ext_ptfm(request: Request) -> WrittenFiles:
         names = ", ".join(interface.name for interface in body.interfaces)
         raise ExportError(
             f"export to ext_ptfm: the format has one interface node, body {body.name!r} has {len(body.interfaces)} "
-            f"({names}); reduce it with the one that carries the tower"
+            f"({names}); reduce it only with the interface that carries the tower"
         )
     model = interface_model(body)
     if model.n_boundary != 6:
@@ -48,9 +48,7 @@ def make_ext_ptfm(request: Request) -> WrittenFiles:
     place = " ".join(f"{x:.9g}" for x in model.nodes[0].position)
     notes = [f"interface {body.interfaces[0].name}: platform reference point, at {place} in the mesh"]
     if not body.is_held:
-        notes.append(
-            "the body is free: no foundation is in its stiffness; reduce it held (`held`) where it is built in"
-        )
+        notes.append("the body is free: its stiffness includes no foundation; reduce it with `held` at its supports")
     f = load_of(model, request.loads)
     amplitudes = {case.name: request.loads.get(case.name, 0.0) for case in body.load_cases}
     notes += [f"static load {name}, amplitude {amplitude:g}" for name, amplitude in amplitudes.items()]
@@ -113,12 +111,12 @@ def is_ext_ptfm(path: Path, head: bytes) -> bool:
 def read_ext_ptfm(files: Sequence[Path], name: str, places: Mapping[int, Array]) -> Superelement:
     """Read a superelement: six dofs of interface node 1, then modes; constant loads form the load case "static".
 
-    The place of the node is not in the file: it is that of node 1 in `places`, the origin where none is given.
+    The file does not contain the position of the node; it is taken from node 1 in `places`, otherwise the origin.
 
     Raises
     ------
     ForeignBodyError
-        If a matrix is missing, is not square or of another size than the others.
+        If a matrix is missing, not square, or of another size than the others.
     """
     path = files[0]
     if len(files) > 1:
@@ -164,7 +162,7 @@ def matrix_after(path: Path, lines: list[str], word: str) -> Array | None:
         raise ForeignBodyError(f"{path}, line {starts[0] + 2}: expected the dimension of the {word.lower()} matrix")
     n = int(size[0])
     if n > LARGEST:
-        raise ForeignBodyError(f"{path}, line {starts[0] + 2}: {n} rows are no reduced body")
+        raise ForeignBodyError(f"{path}, line {starts[0] + 2}: {n} rows are too many for a reduced body")
     rows = [numbers_of(path, starts[0] + 3 + k, line) for k, line in enumerate(lines[starts[0] + 2 :][:n])]
     if len(rows) != n or any(len(row) != n for row in rows):
         got = f"{len(rows)} rows" if len(rows) != n else f"a row of {next(len(r) for r in rows if len(r) != n)}"
@@ -183,7 +181,7 @@ def static_load(path: Path, lines: list[str], n: int) -> tuple[dict[str, Array],
         raise ForeignBodyError(f"{path}: loading: expected a time and {n} forces in each row")
     forces = np.array([row[1 : n + 1] for row in rows])
     if np.ptp(forces, axis=0).max() > 1e-12 * np.abs(forces).max(initial=1e-300):
-        return {}, [f"loads over {len(rows)} times are not taken over: load cases here are constant"]
+        return {}, [f"loads over {len(rows)} times are left out, because load cases are constant"]
     return ({"static": forces[0]} if forces.any() else {}), []
 
 

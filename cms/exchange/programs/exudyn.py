@@ -24,7 +24,7 @@ __all__ = ["is_exudyn", "make_exudyn", "read_exudyn"]
 
 #: angular velocity in the script, relative to the lowest frequency; multiplied by 1, 2, 3 for the three axes
 SPEED = 0.05
-BENT = 0.01  #: initial displacement in the script over the size of the body
+BENT = 0.01  #: initial displacement in the script divided by the size of the body
 FILE_VERSION = 1  #: version of the archive in exudyn 1.9 to 1.13
 
 

@@ -122,7 +122,7 @@ def make_simscape(request: Request) -> WrittenFiles:
     for node in model.nodes:
         if len(node.components) != 6:
             raise ExportError(
-                f"export to simscape: interface {node.interface!r} has nodes without rotations, and a frame of the "
+                f"export to simscape: interface {node.interface!r} has nodes without rotations, but a frame of the "
                 "block has six degrees of freedom; make the interface rigid or distributing"
             )
     rom = {"P": np.array([node.position for node in model.nodes]), "K": model.K, "M": model.M, "C": model.D}

@@ -44,7 +44,7 @@ def make_mbdyn(request: Request) -> WrittenFiles:
     if body.geometric is not None and body.interfaces:
         names = ", ".join(interface.name for interface in body.interfaces)
         notes += (
-            f"record group 19 counts on all {len(body.interfaces)} interfaces in the modal joint, in this order: "
+            f"record group 19 requires all {len(body.interfaces)} interfaces in the modal joint, in this order: "
             f"{names}; it needs `use automatic differentiation`",
         )
     return WrittenFiles({request.path: text.encode("ascii")}, notes)
@@ -139,14 +139,14 @@ def read_mbdyn(files: Sequence[Path], name: str, places: Mapping[int, Array]) ->
 
     With int over mass, c and phi in the frame of the modal node:
 
-        14  int phi_k = 1C          15  int c × phi_k = 2C      16  3C_k, three columns a mode
+        14  int phi_k = 1C          15  int c × phi_k = 2C      16  3C_k, three columns per mode
         17  row a, column j n + k: 4C_kj,a        18  row a, column (j n + k) 3 + b: -5C_jk,ab
-        11  lumped masses, from which these are made where they are not there
+        11  lumped masses, from which missing invariants are computed
 
     Raises
     ------
     ForeignBodyError
-        If a group is missing or has another count of numbers, or nothing says the inertia of the modes.
+        If a group is missing or has a wrong number of entries, or the file has no inertia of the modes.
     """
     path = files[0]
     if len(files) > 1:
@@ -199,17 +199,17 @@ def read_mbdyn(files: Sequence[Path], name: str, places: Mapping[int, Array]) ->
         )
     elif 11 in groups:
         moments = moments_of_lumps(read(11, n_nodes, 6), nodes, Phi, rotations, M)
-        notes = ("invariants made of the lumped masses of record group 11; M* is that of the modal mass",)
+        notes = ("invariants computed from the lumped masses of record group 11; M* is the modal mass",)
     else:
         raise ForeignBodyError(
-            f"{path}: neither record groups 12, 14 and 15 (invariants) nor 11 (lumped masses) are there: nothing "
-            "says how the modes carry momentum; write one of them"
+            f"{path}: neither record groups 12, 14 and 15 (invariants) nor 11 (lumped masses) exist, so the momentum "
+            "of the modes is unknown; write one of them"
         )
     geometric = None
     if 19 in groups:
         geometric = stress_stiffening(path, groups[19], n_nodes, n)
         if geometric is None:
-            notes += (f"record group 19 is not taken over: expected the {12 + 6 * n_nodes} matrices of all loads",)
+            notes += (f"record group 19 is left out: expected the {12 + 6 * n_nodes} matrices of all loads",)
     is_number = all(re.fullmatch(r"\d+", label) for label in labels)
     return ModalBody(
         name=name,
@@ -234,7 +234,7 @@ def stress_stiffening(path: Path, words: list[str], n_nodes: int, n: int) -> Geo
     """Return the matrices of record group 19: a count, then a number and entries of each; None if some are missing.
 
     1 to 6: omega_x², omega_y², omega_z², omega_x omega_y, omega_y omega_z, omega_z omega_x (products once: twice K_ab);
-    7 to 9: angular acceleration; 10 to 12: acceleration less gravity; then force and moment of each node.
+    7 to 9: angular acceleration; 10 to 12: acceleration minus gravity; then force and moment of each node.
     """
     where = f"{path}: record group 19"
     count = whole(path, words[0], where) if words else 0

@@ -131,7 +131,7 @@ def body_of_file(file: Any, path: Path, name: str) -> ModalBody:
         dataset = file[key]
         stored = dataset.id.get_storage_size()
         if dataset.nbytes > 4096 + DENSEST * stored:
-            raise ForeignBodyError(f"{path}: dataset {key!r}: says {dataset.nbytes} bytes and holds {stored}")
+            raise ForeignBodyError(f"{path}: dataset {key!r}: declares {dataset.nbytes} bytes but contains {stored}")
         if dataset.size != int(np.prod(shape)):
             raise ForeignBodyError(f"{path}: dataset {key!r}: expected shape {shape}, got {dataset.shape}")
         return np.asarray(dataset[()], dtype=float).reshape(shape)

@@ -31,7 +31,7 @@ def make_op4(request: Request) -> WrittenFiles:
 
     The rows are six (or three) dofs of each interface node, then the modes as SPOINTs, in the order of EXTRN in the
     .pch; all in the basic system. MUG1 has six rows for each kept node, in the order of table TUG1 in the .pch. Unknown
-    rotations, as at nodes of solid elements, are zero.
+    rotations, such as at nodes of solid elements, are zero.
     """
     model = interface_model(request.body)
     matrices = {"KXX": model.K, "MXX": model.M}
@@ -70,7 +70,7 @@ def make_dmig(request: Request) -> WrittenFiles:
     if model.body.load_cases:
         lines += dmig_lines("PAX", model.loads, named, [(k + 1, 0) for k in range(model.loads.shape[1])], RECTANGULAR)
     notes = [f"interface {node.interface}: GRID {k + 1}" for k, node in enumerate(model.nodes)]
-    notes.append("numbers have the 10 digits that a field of 16 characters holds; op4 holds all")
+    notes.append("numbers have 10 digits, because a field has 16 characters; op4 has all digits")
     return WrittenFiles({request.path: ("\n".join(lines) + "\n").encode("ascii")}, (*notes, *load_notes(model, "PAX")))
 
 
@@ -138,7 +138,7 @@ def recovery_numbers(model: InterfaceModel) -> tuple[IntArray, tuple[str, ...]]:
         taken = np.concatenate([np.arange(len(model.nodes)) + 1, FIRST_SCALAR + np.arange(model.n_modes)])
         if not np.isin(numbers, taken).any():
             return numbers, ("GRIDs of the kept nodes are those of the mesh",)
-        words = ("numbers of the mesh are those of the interfaces, 1, 2, ..., or of the SPOINTs of the modes, too",)
+        words = ("numbers of the mesh coincide with those of interfaces, 1, 2, ..., or of SPOINTs of the modes",)
     return plain, (*words, f"GRIDs of the kept nodes: {FIRST_NODE} and so on")
 
 

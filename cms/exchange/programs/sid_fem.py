@@ -123,7 +123,8 @@ def lines_of(body: ReducedBody, nodes: NodeList, order: Dialect) -> Iterator[str
 def node_terms(body: ReducedBody, nodes: NodeList, row: int) -> dict[str, Taylor]:
     """Return the terms of a node; its axes are those of B.
 
-    A force at an interface stiffens the body, so phi and psi have the derivative -K_i of the second-order displacement.
+    A force at an interface stiffens the body. Therefore the first-order terms of phi and psi are -K_i, the second-order
+    displacement.
     """
     Phi, Psi = nodes.Phi[row], nodes.Psi[row]
     turned = np.array([np.cross(np.eye(3), Psi[:, k]) for k in range(body.n_q)])  # psi~: rows e_a × psi

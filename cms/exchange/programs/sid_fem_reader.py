@@ -46,8 +46,8 @@ def read_sid_fem(files: Sequence[Path], name: str, places: Mapping[int, Array]) 
     Raises
     ------
     ForeignBodyError
-        If the text breaks off, sizes and indices do not fit, the index order cannot be told, or the terms of the
-        equations are not those of one body.
+        If the text is truncated, sizes and indices do not fit, the index order cannot be determined, or the terms do
+        not belong to one body.
     """
     return read_in_order(files, name, None)
 
@@ -61,9 +61,9 @@ def read_in_order(files: Sequence[Path], name: str, q_second: bool | None) -> Mo
     """Read a file in a given index order.
 
     (1) mass, mdCM0 = S, Ct0 = 1Cᵀ, Cr0 = 2Cᵀ, J0, Me, Ke, De
-    (2) 3C: symmetric part J1_k / 2, else that of Gr0 = [2 3C_k]
-    (3) 4C from Ge0 = [2 4C_kl,a], its column 3 l + a or a n + l by the part of Cr1 that is antisymmetric in k, l
-    (4) 5C from Gr1 = [2 5C_lk]; of order 0: missing, for Oe1 holds it together with geometric stiffness
+    (2) 3C: its symmetric part is J1_k / 2, or follows from Gr0 = [2 3C_k]
+    (3) 4C from Ge0 = [2 4C_kl,a]; the part of Cr1 antisymmetric in k, l shows whether its column is 3 l + a or a n + l
+    (4) 5C from Gr1 = [2 5C_lk]; if Gr has order 0, 5C is missing, because Oe1 only has its sum with geometric stiffness
     """
     path = files[0]
     if len(files) > 1:
@@ -72,7 +72,9 @@ def read_in_order(files: Sequence[Path], name: str, q_second: bool | None) -> Mo
     header, terms, nodes, mass = series_of(path, text)
     n = terms["Me"].sizes.get("nrow", 0) if "Me" in terms else 0
     if not n or mass is None:
-        raise ForeignBodyError(f"{path}: expected a mass and the series Me with its rows; the file is no flexible body")
+        raise ForeignBodyError(
+            f"{path}: expected a mass and the series Me with its rows; the file has no flexible body"
+        )
     found = order_of(path, [*terms.values(), *(term for node in nodes.values() for term in node.values())], n, text[0])
     if q_second is None:
         q_second = found
@@ -80,8 +82,8 @@ def read_in_order(files: Sequence[Path], name: str, q_second: bool | None) -> Mo
         raise ForeignBodyError(f"{path}: is in index order m1(row, q, column), not m1(row, column, q)")
     if q_second is None:
         raise ForeignBodyError(
-            f"{path}: its indices do not tell m1(row, q, column) from m1(row, column, q); name the order: --format "
-            "sid_fem-fembeam for the second, or write its word (m1=row,q,col) on the first line"
+            f"{path}: its indices fit both m1(row, q, column) and m1(row, column, q); name the order: --format "
+            "sid_fem-fembeam for the second, or write m1=row,q,col on the first line"
         )
     second = q_second
 
@@ -195,11 +197,11 @@ def gyroscopic(path: Path, Ge: Array | None, Cr1: Array | None, notes: list[str]
         antisymmetric = ["3k+axis"]
     if not antisymmetric:
         raise ForeignBodyError(
-            f"{path}: Ge fits neither order of its columns (3 k + axis, axis n + k): it is no gyroscopic matrix of the "
-            "modes of Cr; the file is of two models, or m1 is in another index order"
+            f"{path}: Ge fits neither order of its columns (3 k + axis, axis n + k): it does not belong to the modes "
+            "of Cr; the file mixes two models, or m1 is in another index order"
         )
     if len(antisymmetric) > 1 and n > 1 and np.abs(orders["3k+axis"] - orders["axis*n+k"]).max() > SAME * size:
-        raise ForeignBodyError(f"{path}: nothing tells the order of the columns of Ge; Cr of first order would")
+        raise ForeignBodyError(f"{path}: the order of the columns of Ge is unknown; Cr of first order would show it")
     notes.append(f"columns of Ge in the file: {antisymmetric[0]}")
     return orders[antisymmetric[0]]
 
@@ -285,7 +287,7 @@ def values_of(
     if (rows, columns) != shape[:2]:
         raise ForeignBodyError(f"{where}: expected {shape[0]} x {shape[1]}, got {rows} x {columns}")
     if int(np.prod(shape)) > LARGEST:
-        raise ForeignBodyError(f"{where}: {shape} numbers are more than a flexible body has")
+        raise ForeignBodyError(f"{where}: {shape} numbers are too many for a flexible body")
     values = np.zeros(shape)
     structure = term.sizes.get("structure", 3)
     if order == 0 and structure == UNIT:

@@ -15,7 +15,7 @@ from fe_models.foundation.arrays import Array, IntArray
 __all__ = ["make_vtk", "numbers_of_cells", "numbers_of_nodes"]
 
 
-LARGEST = 0.05  #: largest displacement of a drawn mode over the size of the body
+LARGEST = 0.05  #: largest displacement of a drawn mode divided by the size of the body
 #: stress components xx yy zz xy yz xz as indices into xx yy zz yz xz xy of this project
 STRESS_ORDER = [0, 1, 2, 5, 3, 4]
 TRIANGLE, VERTEX = 5, 1  #: VTK codes of the cell types
@@ -26,7 +26,7 @@ def make_vtk(request: Request) -> WrittenFiles:
     """Return FILE.pvd and FILE_1.vtu, FILE_2.vtu, ...: undeformed points in mesh coordinates, fields in mesh axes.
 
     The coordinate q of a mode is chosen so that its largest nodal displacement is a twentieth of the body size. Stress
-    and displacement belong to that q, which is stored in the field data together with the frequency.
+    and displacement belong to this q, which is stored in the field data together with the frequency.
     """
     body = request.body
     points = body.frame.origin + body.nodes @ body.frame.axes.T

@@ -140,7 +140,7 @@ def test_an_address_finds_the_same_node_by_number_and_by_place():
 def test_a_place_without_a_kept_node_is_refused_with_the_nearest_ones():
     _mesh, body = solid_bar(nx=3)
     reduced = reduce(body, craig_bampton(body, n_modes=2))
-    with pytest.raises(BodyError, match=r"sensor 'x': body 'bar': no node that its file keeps is at \[0.4, 0, 0\].*"
+    with pytest.raises(BodyError, match=r"sensor 'x': body 'bar': no kept node is at \[0.4, 0, 0\].*"
                                         r"Keep the node there \(keep = \[...\]"):  # fmt: skip
         Address(position=(0.4, 0.0, 0.0)).find(reduced, "sensor 'x'")
     assert Address(position=(0.4, 0.0, 0.0), tolerance=0.1).find(reduced, "x").distance > 0.05

@@ -342,7 +342,7 @@ def test_a_missing_dataset_and_a_wrong_invariant_are_refused_even_when_sealed(bo
     with pytest.raises(ModalFileError, match="expected finite numbers"):
         written_with(replace(content, datasets=bad), tmp_path / "a.h5")
     units = {**content.attributes, "/units": {**content.attributes["/units"], "length": 1.0}}
-    with pytest.raises(ModalFileError, match="expected the factors of that system"):
+    with pytest.raises(ModalFileError, match="expected the factors of this system"):
         written_with(replace(content, attributes=units), tmp_path / "a.h5")
 
 
@@ -488,7 +488,7 @@ def test_moments_hold_what_the_point_masses_say(body):
 def test_a_count_that_is_not_that_of_the_groups_is_refused_before_any_work(body, tmp_path, count):
     content = modal_content.content_of(body, modal_file.VERSION)
     attributes = {**content.attributes, "/interfaces": {"count": count}}
-    with pytest.raises(ModalFileError, match="attribute 'count' of /interfaces: expected 2, as many as it holds"):
+    with pytest.raises(ModalFileError, match="attribute 'count' of /interfaces: expected 2, the number of its groups"):
         written_with(replace(content, attributes=attributes), tmp_path / "a.h5")
 
 

@@ -143,7 +143,7 @@ def test_missing_inertia_terms_are_named(to, body, tmp_path):
 
 def test_a_body_without_what_the_format_is_made_of(tmp_path):
     rigid = synthetic_reduced_body(n_q=0)
-    refused(tmp_path, "has no modes: it is rigid", rigid)
+    refused(tmp_path, "has no modes, so it is rigid", rigid)
     body = synthetic_reduced_body()
     bare = replace(body, interfaces=(), geometric=None)
     refused(tmp_path, "has no interfaces", bare, to="mbdyn")
@@ -185,9 +185,7 @@ def test_a_place_that_cannot_be_written(body, tmp_path):
 
 def test_a_device_takes_a_single_file_only(body, tmp_path):
     cms.exchange.export_body(body, "/dev/null", to="mbdyn", units="m-kg-s")
-    with pytest.raises(
-        ExportError, match=r"is a device or a pipe, and exudyn is written in files that belong together"
-    ):
+    with pytest.raises(ExportError, match=r"is a device or a pipe, but exudyn consists of several files"):
         cms.exchange.export_body(body, "/dev/null", to="exudyn", units="m-kg-s")
 
 

@@ -110,7 +110,7 @@ def test_two_statements_of_one_integral_are_compared_and_the_first_is_taken(name
 def test_5c_without_4c_is_refused():
     m, c, phi = cloud(1)
     given = {name: value for name, value in invariants(m, c, phi).items() if name != "C4"}
-    with pytest.raises(ForeignBodyError, match="5C is there and 4C, which is a part of it, is not"):
+    with pytest.raises(ForeignBodyError, match="the file has 5C but not 4C, which is a part of it"):
         moments_of_invariants("file", float(m.sum()), m @ c, **given)
 
 

@@ -187,7 +187,7 @@ def test_damage_of_mbsim_files_is_told(mean, tmp_path):
         del file["nodal stress matrix"]
         file.create_dataset("nodal stress matrix", shape=(10**9, 10**3), chunks=(1000, 1000), dtype="f8")
 
-    refused(hostile, "says 8000000000000 bytes and holds 0")
+    refused(hostile, "declares 8000000000000 bytes but contains 0")
     content = whole.read_bytes()
     (tmp_path / "cut.h5").write_bytes(content[: len(content) // 2])
     with pytest.raises((ForeignBodyError, ValueError)):
@@ -303,7 +303,7 @@ def test_a_superelement_of_openfast_comes_back(tmp_path):
     for pattern, to, words in (
         ("!Stiffness Matrix", "!Other Matrix", "stiffness matrix is missing"),
         (f"!Dimension: {n}\n ", f"!Dimension: {n + 1}\n ", "line 18: could not convert"),
-        (f"!Dimension: {n}\n ", "!Dimension: 90000000\n ", "are no reduced body"),
+        (f"!Dimension: {n}\n ", "!Dimension: 90000000\n ", "are too many for a reduced body"),
         (r"\de\+0\d", "x", "could not convert"),
     ):
         changed = re.sub(pattern, to, text, count=1)

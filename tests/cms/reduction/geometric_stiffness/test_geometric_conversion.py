@@ -277,5 +277,5 @@ def test_a_matrix_of_another_size_is_named(made):
 def test_spread_loads_stand_with_what_they_need(made):
     with pytest.raises(BodyError, match="spread over the nodes without the nodal sums"):
         replace(made["tisserand"], nodal_sums=None)
-    with pytest.raises(BodyError, match="without the turned loads"):
+    with pytest.raises(BodyError, match="expected turned loads too"):
         replace(made["tisserand"].geometric, turned=None)
