@@ -109,8 +109,8 @@ def refused(tmp_path, match, body, to="mbsim", error=ExportError, **options):
 
 def test_an_unknown_format_is_refused_with_the_nearest(body, tmp_path):
     refused(tmp_path, "unknown format 'mbsin'; did you mean 'mbsim'", body, to="mbsin")
-    refused(tmp_path, "'mnf': the file of Adams is not documented.* nastran-dmig", body, to="mnf")
-    refused(tmp_path, "'Simpack': the file of Simpack is not documented.* sid_fem", body, to="Simpack")
+    refused(tmp_path, "'mnf': the file format of Adams is not documented.* nastran-dmig", body, to="mnf")
+    refused(tmp_path, "'Simpack': the file format of Simpack is not documented.* sid_fem", body, to="Simpack")
 
 
 def test_units_are_those_of_the_file_where_none_are_said(body, tmp_path):
@@ -121,7 +121,7 @@ def test_units_are_those_of_the_file_where_none_are_said(body, tmp_path):
     (tmp_path / "own.h5").unlink()
     refused(tmp_path, "unknown unit system 'm-kg'", body, error=UnitsError, units="m-kg")
     refused(
-        tmp_path, "units mm-t-s: the program behind ext_ptfm knows m-kg-s only", body, to="ext_ptfm", units="mm-t-s"
+        tmp_path, "units mm-t-s: the program behind ext_ptfm accepts only m-kg-s", body, to="ext_ptfm", units="mm-t-s"
     )
 
 

@@ -157,9 +157,9 @@ def test_matrices_without_rows_or_places_ask_for_them(tmp_path):
     files = {"K": tmp_path / "K.mtx", "M": tmp_path / "M.mtx"}
     with pytest.raises(ForeignBodyError, match="do not say which dof each row is"):
         cms.exchange.import_body(files, units="m-kg-s")
-    with pytest.raises(ForeignBodyError, match="have dofs and no place"):
+    with pytest.raises(ForeignBodyError, match="have dofs but no position"):
         cms.exchange.import_body(files, units="m-kg-s", boundary=[1, 2])
-    with pytest.raises(ForeignBodyError, match="3 nodes have 18 dofs, the matrices 14 rows"):
+    with pytest.raises(ForeignBodyError, match="3 nodes have 18 dofs, the matrices have 14 rows"):
         cms.exchange.import_body(files, units="m-kg-s", boundary=[1, 2, 3])
     with pytest.raises(ForeignBodyError, match="M is missing"):
         cms.exchange.import_body({"K": files["K"]}, units="m-kg-s", boundary=[1, 2])
@@ -200,7 +200,7 @@ def test_a_table_of_nodal_masses_completes_a_superelement(outboard, tmp_path):
     words = ["import", str(outboard), "--units", "mm-kg-s", "--nodal-masses", str(table), "-o", str(output)]
     result = CliRunner().invoke(app, words)
     assert result.exit_code != 0  # equal masses are not those of this frame: its parts are of other sizes
-    assert "not of this body" in " ".join(result.output.split())
+    assert "do not belong to this body" in " ".join(result.output.split())
     table.write_text("node,mass\n3,1.0\nx\n")
     result = CliRunner().invoke(app, words)
     assert "masses.csv, line 3: expected node, mass" in " ".join(result.output.split())
@@ -250,7 +250,7 @@ def test_a_substructure_of_abaqus_finds_its_places_in_a_deck(tmp_path):
     assert_allclose(body.free_frequencies, own.free_frequencies, rtol=1e-8)
     from_deck = cms.exchange.import_body(tmp_path / "part.mtx", units="m-kg-s", nodes=tmp_path / "part.inp")
     assert_allclose(from_deck.free_frequencies, own.free_frequencies, rtol=1e-8)
-    with pytest.raises(ForeignBodyError, match="have dofs and no place"):
+    with pytest.raises(ForeignBodyError, match="have dofs but no position"):
         cms.exchange.import_body(tmp_path / "part.mtx", units="m-kg-s")
 
 

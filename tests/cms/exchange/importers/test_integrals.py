@@ -124,7 +124,7 @@ def test_masses_beside_complete_what_a_reduced_matrix_does_not_say():
     agree(found, whole)
     assert found.is_exact
     assert words.startswith("mass ")
-    with pytest.raises(ForeignBodyError, match="they are not of this body: mass differs by"):
+    with pytest.raises(ForeignBodyError, match="they do not belong to this body: mass differs by"):
         completed(known, replace(whole, m=1.5 * whole.m), "masses")
 
 

@@ -145,14 +145,14 @@ def test_nodal_masses_complete_it_exactly_where_they_are_the_mass(lumped):
 def test_nodal_masses_of_another_body_are_refused(lumped):
     element, _ = craig_bampton_matrices(lumped, 2)
     masses = masses_of(lumped)
-    with pytest.raises(ForeignBodyError, match="not of this body: mass differs by 100 %"):
+    with pytest.raises(ForeignBodyError, match="do not belong to this body: mass differs by 100 %"):
         body_of_superelement(element, options(inertia=NodalMasses(masses.node_numbers, 2 * masses.masses)))
     with pytest.raises(ForeignBodyError, match=r"nodes \[7\] are not among"):
         body_of_superelement(element, options(inertia=NodalMasses(np.array([7]), np.array([1.0]))))
     with pytest.raises(ForeignBodyError, match="a mass above zero in each row"):
         body_of_superelement(element, options(inertia=NodalMasses(np.array([FIRST]), np.array([-1.0]))))
     few = replace(element, recovery=None)
-    with pytest.raises(ForeignBodyError, match="have mass, and the files do not say how they move"):
+    with pytest.raises(ForeignBodyError, match="have mass, but the files have no recovery rows"):
         body_of_superelement(few, options(inertia=masses))
 
 
@@ -245,7 +245,7 @@ def test_what_does_not_fit_is_told(element):
     bad[2, 2] = np.nan
     with pytest.raises(ForeignBodyError, match="expected finite numbers, got 1 that are not"):
         spoilt(element, K=bad)
-    with pytest.raises(ForeignBodyError, match="have dofs and no place"):
+    with pytest.raises(ForeignBodyError, match="have dofs but no position"):
         spoilt(element, node_numbers=element.node_numbers[5:], nodes=element.nodes[5:])
     twice = np.array(element.dofs)
     twice[1] = twice[0]

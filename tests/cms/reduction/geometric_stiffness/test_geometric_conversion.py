@@ -275,7 +275,7 @@ def test_a_matrix_of_another_size_is_named(made):
 
 
 def test_spread_loads_stand_with_what_they_need(made):
-    with pytest.raises(BodyError, match="spread over the nodes without the nodal sums"):
+    with pytest.raises(BodyError, match="spread over the nodes need the nodal sums"):
         replace(made["tisserand"], nodal_sums=None)
     with pytest.raises(BodyError, match="expected turned loads too"):
         replace(made["tisserand"].geometric, turned=None)
