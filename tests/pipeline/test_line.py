@@ -126,3 +126,12 @@ def test_job_of_the_readme_gives_the_body_of_its_python_example(tmp_path, reduce
     assert_allclose(from_job.K, reduced.K, rtol=0, atol=1e-10 * reduced.K.max())
     assert_allclose(from_job.Phi, reduced.Phi, rtol=0, atol=1e-10 * np.abs(reduced.Phi).max())
     assert_allclose(from_job.moments.J0, reduced.moments.J0, rtol=0, atol=1e-12 * reduced.moments.J0.max())
+
+
+def test_the_system_of_the_readme_moves_its_body(tmp_path, reduced):
+    cms.write(reduced, tmp_path / "rod.h5")
+    (tmp_path / "swing.toml").write_text(re.search(r"```toml\n(\[system\].*?)```", README.read_text(), re.DOTALL)[1])
+    system, run = ff.read_system(tmp_path / "swing.toml")
+    motion = ff.integrate(system, run.integrator, 20 * run.h, run.h)
+    assert_allclose(motion.energies.balance, 0, rtol=0, atol=1e-6)
+    assert motion.body("rod").interface("small_end").position[-1, 2] < 0
