@@ -60,7 +60,7 @@ MOTION_COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz")
 
 STRESS_COMPONENTS = ("xx", "yy", "zz", "yz", "xz", "xy")  #: components of a symmetric tensor, in Voigt's order
 
-SYMMETRY_DEFECT = 1e-8  #: largest |A - A.T| / |A| that is rounding
+SYMMETRY_DEFECT = 1e-8  #: largest |A - A.T| / |A| that counts as rounding
 
 
 @overload

@@ -24,7 +24,7 @@ class ReportedError(Exception):
     """Root of every intentional error; its text is written for the user."""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Make copies with the same text and attributes, whatever the arguments of the constructor."""
+        """Make copies with the same text and attributes, for any arguments of the constructor."""
         return remade, (type(self), self.args, self.__dict__)
 
 

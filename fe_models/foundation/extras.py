@@ -20,9 +20,9 @@ def extra_module(name: str, *, extra: str, purpose: str) -> ModuleType:
     name
         Dotted name of the module.
     extra
-        The extra of this project that installs it.
+        Extra of this project that installs the library.
     purpose
-        What needs the library, as the beginning of the message: "OP2 files".
+        Purpose of the library, with which the message begins, such as "OP2 files".
 
     Raises
     ------

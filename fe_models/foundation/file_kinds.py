@@ -8,7 +8,7 @@ __all__ = ["KINDS", "FileKind"]
 class FileKind(NamedTuple):
     """A kind of file."""
 
-    command: str  #: that runs it
+    command: str  #: command that runs files of this kind
     model: str  #: class that describes its tables, as "module:class"
     is_parametric: bool = False  #: whether it may have parameters, base files and repeated tables
 

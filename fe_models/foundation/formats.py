@@ -18,4 +18,4 @@ class FileFormat:
     key: str = ""  #: value for `--to` and `format =`; empty if the suffix or the content identifies the format
     tried: str = ""  #: programs and versions whose files were read here, or which read our files
     lost: str = ""  #: content that the format cannot hold, or that is not read
-    extra: str = ""  #: the extra of this project that the format needs
+    extra: str = ""  #: extra of this project that the format needs

@@ -1,9 +1,9 @@
 """HDF5 files that are written completely or not at all, with a seal, and read without trust in their content.
 
-Writing: HDF5 writes through `Storage`, which records the first disk error. The library itself never meets a full disk,
-on which it can crash, and the caller gets the plain OSError. Reading: only items that lie in the file itself and have
-the declared size are read (`own_items`). Links to other files, virtual or external datasets, and shapes that the bytes
-of the file cannot fill are rejected.
+Writing: HDF5 writes through `Storage`, which records the first disk error and hides it from the library, because HDF5
+can crash if the disk is full. The caller gets the OSError. Reading: only items that are stored in the file itself and
+have the declared size are read (`own_items`). Links to other files, virtual or external datasets, and shapes with more
+values than the file has bytes for are rejected.
 """
 
 import hashlib
@@ -39,8 +39,8 @@ SHA256 = "sha256"  #: name of the attribute of a dataset
 MOST_COMPRESSED = 1032  #: largest compression ratio of deflate, for files that another tool has repacked
 BLOCK_VALUES = 1 << 20  #: number of values that are hashed at a time
 LARGE = 1 << 20  #: size of an array above which compression is tried [bytes]
-PAYS = 0.75  #: largest share of its size that a compressed array may have; dense numbers do not compress enough
-SAMPLES, SAMPLE = 16, 4096  #: number of samples of an array that are compressed on trial, and number of values in each
+PAYS = 0.75  #: largest ratio of compressed to original size for which compression is used; dense numbers exceed it
+SAMPLES, SAMPLE = 16, 4096  #: number of samples of an array for a trial compression, and number of values in each
 Attribute = str | int | float
 
 
@@ -118,12 +118,12 @@ def write_sealed_file(path: Path, kind: Kind, fill: Callable[[Any], None], *, pa
     kind
         Kind of file, for the seal.
     fill
-        Writes the content into the open `h5py.File`.
+        Function that writes the content into the open `h5py.File`.
 
     Raises
     ------
     OSError
-        If the disk cannot take the file. An existing file at `path` is then unchanged.
+        If the file cannot be written to disk. An existing file at `path` is then unchanged.
     """
     import h5py
 
@@ -161,7 +161,8 @@ class Manifest:
     """Writer of attributes and datasets to a file, and of a digest over all of them at the end.
 
     The digest, a root attribute, is the sha256 over the paths, types, shapes and sha256 of all contents. It does not
-    depend on the layout of HDF5. It therefore survives repacking, and equal digests mean equal contents.
+    depend on the layout of HDF5. Therefore it does not change if the file is repacked, and equal digests mean equal
+    contents.
     """
 
     file: Any  #: open `h5py.File`
@@ -183,7 +184,7 @@ class Manifest:
     def rows(
         self, path: str, shape: tuple[int, ...], parts: Iterable[Any], attributes: Mapping[str, Attribute]
     ) -> None:
-        """Write a float64 dataset of that shape from successive blocks of its rows, without holding them all.
+        """Write a float64 dataset of this shape from successive blocks of its rows, without keeping them all in memory.
 
         Raises
         ------
@@ -212,8 +213,8 @@ class Manifest:
 def filters_for(stored: Any) -> dict[str, Any]:
     """Return the HDF5 filters of a dataset: none, or chunks with shuffle and deflate if these save much space.
 
-    Both filters belong to every HDF5 installation. Large arrays are compressed on trial at a few places. Diagonal
-    matrices and blocks of zeros shrink to a hundredth of their size.
+    Both filters belong to every HDF5 installation. Samples of large arrays are compressed to estimate the ratio.
+    Diagonal matrices and blocks of zeros shrink to a hundredth of their size.
     """
     if stored.dtype.kind not in "fi" or stored.nbytes < LARGE:
         return {}
@@ -289,7 +290,7 @@ def digest_of(entries: Iterable[Entry]) -> str:
 
 @contextmanager
 def opened(path: Path, kind: Kind, *, has_seal: bool) -> Iterator[Any]:
-    """Open the HDF5 part of a file whose seal was checked, and report every fault in it as a fault of the file.
+    """Open the HDF5 part of a file whose seal was checked, and raise the error of the kind for every fault in it.
 
     Raises
     ------

@@ -5,7 +5,7 @@ A file is resolved in four steps:
 1. It is merged over the files that it extends. Tables are merged key by key; an empty table, `{}`, removes its key.
 2. The parameters are replaced by those given from outside (`--set length=0.4`, the points of a sweep).
 3. `repeat` copies its table, once for each value of an index, or once for each row of values.
-4. Each `{expression}` in a text is replaced by its value. A text that is one such expression becomes that value, so
+4. Each `{expression}` in a text is replaced by its value. A text that consists of one expression becomes its value, so
    `mass = "{density * volume}"` is a number.
 
 Expressions are evaluated by simpleeval: numbers, texts, lists, comparisons, `a if x < b else c`, and `FUNCTIONS`.
@@ -70,7 +70,7 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "range": lambda *limits: list(range(*(min(limit, MOST_COPIES) for limit in limits))),
 }  # fmt: skip
 CONSTANTS = {"pi": math.pi}
-INDEX = "i"  #: name of the index where `repeat` is a count
+INDEX = "i"  #: name of the index if `repeat` is a count
 EXPRESSION = re.compile(r"\{\{|\}\}|\{([^{}]*)\}")
 
 
@@ -80,11 +80,11 @@ def read_parametric(path: Path, error: type[Exception], changes: Mapping[str, An
     Parameters
     ----------
     path
-        The file.
+        Path of the file.
     error
-        The class of error to raise.
+        Class of the error to raise.
     changes
-        Values from outside: of parameters by name, of all other keys by key path in the resolved file.
+        Values from outside: parameters by name, all other keys by key path in the resolved file.
 
     Raises
     ------
@@ -115,10 +115,10 @@ def read_parametric(path: Path, error: type[Exception], changes: Mapping[str, An
 
 
 def json_schema(model: type[Table], *, is_parametric: bool) -> dict[str, Any]:
-    """Return the JSON schema of the files of a model, with which editors complete keys and show their meanings.
+    """Return the JSON schema of the files of a model, with which editors complete and describe keys.
 
     In a parametric file, every value may be a text with an expression, every table may be repeated, and
-    `[parameters]` and `extends` are keys of the file. No key is required, because another file may hold it.
+    `[parameters]` and `extends` are keys of the file. No key is required, because a base file may contain it.
     """
     schema = model.model_json_schema()
     if not is_parametric:
@@ -196,7 +196,7 @@ def extended_files(path: Path, error: type[Exception]) -> tuple[Path, ...]:
 def merged(
     path: Path, error: type[Exception], chain: tuple[Path, ...]
 ) -> tuple[dict[str, Any], dict[Location, tuple[Path, Location]], tuple[Path, ...]]:
-    """Return the content of a file merged over the files that it extends, where each key comes from, and all files."""
+    """Return the content of a file merged over the files that it extends, the origin of each key, and all files."""
     if path.resolve() in [each.resolve() for each in chain]:
         names = " extends ".join(each.name for each in (*chain, path))
         raise error(f"{chain[0]}: files extend each other in a circle: {names}")
@@ -253,7 +253,7 @@ def locations(value: Any) -> Iterator[Location]:
 
 
 def relocated(value: Any, folder: Path) -> Any:
-    """Return the content of a file in another folder, with absolute names of the files that stand beside it."""
+    """Return the content of a file in another folder, with absolute paths of the files in that folder."""
     if isinstance(value, dict):
         return {key: relocated(inner, folder) for key, inner in value.items()}
     if isinstance(value, list):
@@ -301,7 +301,7 @@ class Resolver:
         return value
 
     def parameter_value(self, value: Any, location: Location) -> Any:
-        """Return the value of a parameter as written: each text in it is an expression."""
+        """Return the value of a parameter from its entry in the file, where each text is an expression."""
         if isinstance(value, str):
             return self.expression(value, location, {})
         if isinstance(value, list):
@@ -349,7 +349,7 @@ class Resolver:
         return list(value) if isinstance(value, tuple) else value
 
     def text(self, text: str, location: Location, local: Mapping[str, Any]) -> Any:
-        """Return a text with its expressions replaced, or the value of the one expression that it consists of."""
+        """Return a text with its expressions replaced; if it consists of one expression, return its value."""
         whole = EXPRESSION.fullmatch(text)
         if whole and whole[1] is not None:
             return self.expression(whole[1], location, local)
@@ -409,7 +409,7 @@ class Resolver:
         return result
 
     def copies(self, repeat: Any, location: Location, local: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-        """Yield the names that each copy of a repeated table knows."""
+        """Yield the names and values that each copy of a repeated table can use."""
         location = (*location, "repeat")
         repeat = self.value(repeat, location, location, local)
         rows: list[dict[str, Any]]

@@ -28,11 +28,11 @@ class Summary:
     Parameters
     ----------
     title
-        Its kind and name.
+        Kind and name of the object.
     rows
         Labels and values.
     headings
-        Headings of a table below, if there is one.
+        Headings of the table below the rows, if there is one.
     table
         Rows of this table; the first `MOST_ROWS` are shown.
     """

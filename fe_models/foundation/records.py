@@ -1,8 +1,8 @@
-"""Public objects and functions: what they are given is checked where it enters, and copies of objects are frozen too.
+"""Checks of the arguments of public objects and functions, and frozen copies of objects.
 
-Annotations say what is expected, also the shapes of arrays (`ArrayShape`); a class that has a name for each of its
-objects offers `of_name(text)`, and is taken by that name too. NumPy makes writable copies of read-only arrays, and a
-mapping proxy cannot be pickled at all.
+Annotations state the expected types, and the shapes of arrays (`ArrayShape`). If a class has a method
+`of_name(text)`, its objects may also be given by name. Copies need care, because NumPy makes writable copies of
+read-only arrays, and a mapping proxy cannot be pickled at all.
 """
 
 import inspect
@@ -37,7 +37,7 @@ __all__ = [
 ]  # fmt: skip
 
 MOST_KINDS = 3  #: largest number of types that a message names
-ORTHONORMAL = 1e-6  #: largest defect of orthonormal axes that is rounding of printed digits
+ORTHONORMAL = 1e-6  #: largest defect of orthonormal axes, which rounding of printed digits may cause
 
 Class = TypeVar("Class", bound=type)
 Key = TypeVar("Key")
@@ -65,7 +65,7 @@ def restored_mapping(items: dict[Any, Any]) -> "FrozenMapping[Any, Any]":
 
 
 def frozen_copies(kind: Class) -> Class:
-    """Decorate a frozen data class: copies hold only its fields, without cached values, and arrays are read-only."""
+    """Decorate a frozen data class: copies contain only its fields, no cached values, and arrays are read-only."""
 
     def state(self: Any) -> dict[str, Any]:
         return {part.name: getattr(self, part.name) for part in fields(self)}
@@ -96,7 +96,7 @@ def read_only(value: Any) -> Any:
 
 
 class ArrayShape(NamedTuple):
-    """The shape of an array, or the length of a tuple, that a field holds: `Annotated[Array, ArrayShape((3, "n_q"))]`.
+    """Shape of an array, or length of a tuple, in a field: `Annotated[Array, ArrayShape((3, "n_q"))]`.
 
     Parameters
     ----------
@@ -127,16 +127,16 @@ def shapes_of(kind: Hashable) -> dict[str, tuple[ArrayShape, Any]]:
 def put_arrays(record: object, where: str, error: type[Exception]) -> None:
     """Make the fields of a frozen record that declare an `ArrayShape` read-only arrays, or tuples; refuse other shapes.
 
-    A large array on disk is read in slices of rows. `Columns` that are no array of this process stay where they are.
+    A large array on disk is read in slices of rows. Distributed `Columns` are not moved.
 
     Parameters
     ----------
     record
         The record, in its `__post_init__`.
     where
-        What the record is, for messages.
+        Description of the record, for messages.
     error
-        Raised if an array has another shape, holds a NaN or an infinity, or is not symmetric or orthonormal.
+        Raised if an array has another shape, contains a NaN or an infinity, or is not symmetric or orthonormal.
     """
     lengths: dict[int | str | None, int] = {}  # of the axes that have names
     for name, (shape, held) in shapes_of(cast(Hashable, type(record))).items():
@@ -189,20 +189,20 @@ class Takes(NamedTuple):
 
 
 class MismatchError(Exception):
-    """A value is not of the annotated kind; made of words for what was expected, and the value or item of a list."""
+    """A value is not of the annotated kind; arguments: description of the expected kind, and the value or list item."""
 
 
 def conformed(hint: Any, value: Any) -> Any:
-    """Return a value as its annotation wants it: a name becomes an object, one object a sequence of one.
+    """Convert a value as its annotation requires: a name becomes an object, one object becomes a sequence of one.
 
-    Shapes and bounds of numbers are left to those who use them.
+    Shapes and ranges of numbers are not checked here.
 
     Parameters
     ----------
     hint
-        The annotation, resolved.
+        Resolved annotation.
     value
-        What the user gave.
+        Value given by the user.
 
     Raises
     ------
@@ -217,17 +217,17 @@ def conformed(hint: Any, value: Any) -> Any:
         return conformed(next((extra.hint for extra in extras if isinstance(extra, Takes)), held), value)
     if kind in (Union, UnionType):
         hints = get_args(hint)
-        if ARRAY_LIKE <= set(hints):  # one alternative for the several of `ArrayLike`: all that NumPy makes an array of
+        if ARRAY_LIKE <= set(hints):  # one alternative for all of `ArrayLike`: anything that NumPy converts to an array
             hints = np.ndarray, *(hint for hint in hints if hint not in ARRAY_LIKE)
         return _first_conformed(hints, value)
     if kind is Literal:
         if not any(isinstance(value, type(choice)) and value == choice for choice in get_args(hint)):
             raise MismatchError(f"one of {', '.join(map(str, get_args(hint)))}", value)
         return value
-    if kind is Any or not isinstance(kind, type):  # or it says nothing at run time
+    if kind is Any or not isinstance(kind, type):  # the annotation cannot be checked at run time
         return value
     if issubclass(kind, Iterable) and not issubclass(kind, str | bytes | Mapping | np.ndarray) and get_args(hint):
-        is_row = kind is tuple and Ellipsis not in get_args(hint)  # of items of different kinds
+        is_row = kind is tuple and Ellipsis not in get_args(hint)  # a tuple with an annotation for each item
         return value if is_row and hasattr(value, "__len__") else _sequence(kind, get_args(hint)[0], value)
     return _of_class(kind, value)
 
@@ -255,7 +255,7 @@ def _sequence(kind: type, item: Any, value: Any) -> Any:
     """Return a sequence of conformed items; one item becomes a sequence of one."""
     is_one = isinstance(value, str) or not isinstance(value, Iterable)
     if not is_one and not isinstance(value, list | tuple):
-        return value  # its reader goes through it, perhaps only once
+        return value  # not iterated here, because an iterator can be consumed only once
     given = [value] if is_one else value
     try:
         items = [conformed(item, each) for each in given]
@@ -266,19 +266,19 @@ def _sequence(kind: type, item: Any, value: Any) -> Any:
     return value if is_as_given and (kind is not tuple or isinstance(value, tuple)) else tuple(items)
 
 
-#: words for those kinds that are not called by the names of their classes
+#: names of kinds in messages, if these differ from the names of their classes
 KINDS: dict[Any, str] = {
     str: "text", NoneType: "None", bool: "True or False", type: "a class", Callable: "a function",
     Mapping: "a dictionary", dict: "a dictionary", np.ndarray: "numbers", float: "a number", int: "a number",
     complex: "a number",
 }  # fmt: skip
-#: attributes one of which a value has that may be a number, or an array
+#: attributes that identify possible numbers and arrays; a value needs one of them
 OF_NUMBERS, OF_ARRAYS = ("__float__", "__index__", "__complex__"), ("__len__", "__float__", "shape")
 ARRAY_LIKE = set(get_args(ArrayLike))
 
 
 def _of_class(kind: type, value: Any) -> Any:
-    """Return an object of a class, also from its name; what may be a number or an array is left as it is."""
+    """Return an object of a class, also from its name; possible numbers and arrays are returned unchanged."""
     is_text = isinstance(value, str)
     is_array = kind is np.ndarray or kind.__module__.startswith("scipy.sparse")
     if is_text and kind is not str and hasattr(kind, "of_name"):
@@ -305,12 +305,12 @@ def hints_of(subject: Hashable) -> dict[str, Any]:
     return get_type_hints(subject, include_extras=True)
 
 
-#: for each function or data class: (input, type) of the values that were accepted unchanged, as all of the type are
+#: (input, type) of values that each function or data class accepted unchanged; all values of the type are accepted
 ACCEPTED: defaultdict[Hashable, set[tuple[str, type]]] = defaultdict(set)
 
 
 def conformed_inputs(where: str, subject: Hashable, given: Mapping[str, Any], error: type[Exception]) -> Any:
-    """Return those inputs of a function or data class that change; raise the error for the first of another kind."""
+    """Return the inputs of a function or data class that were converted; raise the error for the first wrong kind."""
     changed = {}
     hints, accepted = hints_of(subject), ACCEPTED[subject]
     for name, value in given.items():
@@ -336,7 +336,7 @@ def checked_fields(error: type[Exception], *, misfit: type[Exception] = BodyErro
     Parameters
     ----------
     error
-        Raised if a field is of another kind.
+        Raised if a field has a wrong kind.
     misfit
         Raised if an array does not have its `ArrayShape`.
     """
@@ -365,29 +365,29 @@ def checked_fields(error: type[Exception], *, misfit: type[Exception] = BodyErro
 
 
 def refused_by(own: Callable[[Any], None] | None, subject: Any) -> None:
-    """Let a class refuse an object in its own words, if it does; they say more than the annotation."""
+    """Run a class's own check, whose message is more specific than that of the annotation."""
     if own is None:
         return
     try:
         own(subject)
     except Exception as failure:
         if isinstance(failure, ReportedError):
-            raise  # any other: it was not made for a value of this kind
+            raise  # other errors are ignored: the check was not written for a value of this kind
 
 
 def at_door(package: str, name: str, found: Any, error: type[Exception]) -> Any:
-    """Return what a package offers under a name; functions then check their arguments against their annotations.
+    """Return a public object of a package; functions are wrapped so that they check arguments by their annotations.
 
     Parameters
     ----------
     package
         Name of the package; the checking function is stored in it.
     name
-        The public name.
+        Public name.
     found
-        The object as its module defines it.
+        Object that the module defines.
     error
-        Raised if an argument is of another kind; Python's `TypeError` if one is missing or has an unknown name.
+        Raised if an argument has a wrong kind; Python's `TypeError` if one is missing or has an unknown name.
     """
     if not inspect.isfunction(found):
         return found

@@ -1,7 +1,7 @@
-"""The seal of a file: 512 bytes of text before its HDF5 part, which reveal every change of a later byte.
+"""The seal of a file: 512 bytes of text before its HDF5 part, by which every change of a later byte is detected.
 
-HDF5 readers skip these bytes (the "user block"). They hold the length of the file and the sha256 of all bytes that
-follow. Both are compared before HDF5 opens the file, because HDF5 may hang, crash or use all memory on damaged
+HDF5 readers skip these bytes (the "user block"). They contain the length of the file and the sha256 of all following
+bytes. Both are compared before HDF5 opens the file, because HDF5 may hang, crash or use all memory on damaged
 structures.
 """
 

@@ -8,7 +8,7 @@ from typing import Any
 
 __all__ = ["bounded_threads", "in_threads", "n_processors", "n_threads", "one_blas_thread", "thread_environment"]
 
-#: each thread has a workspace over all nodes, and memory bandwidth limits the speed at fewer threads already
+#: largest number of threads; each has a workspace over all nodes, and memory bandwidth is exhausted by fewer threads
 MOST_THREADS = 16
 LIBRARIES = ("OMP", "MKL", "OPENBLAS", "NUMBA")
 

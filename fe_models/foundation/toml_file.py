@@ -47,17 +47,17 @@ class FileContent(dict[str, Any]):
     Parameters
     ----------
     tables
-        The content by key.
+        Content by key.
     path
-        The file.
+        Path of the file.
     files
         The file and all files that it extends.
     origins
-        For key paths that come from elsewhere: the file, and the key path there.
+        File and key path there, for each key path that comes from another file.
     outside
         Key paths of values that were set from outside the file.
     parameters
-        The values of its parameters, by name.
+        Values of the parameters of the file, by name.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class FileContent(dict[str, Any]):
         self.origins, self.parameters = origins or {}, parameters or {}
 
     def place(self, location: Location) -> str:
-        """Return ' (line 12)' for a key path, ' (base.toml, line 12)' in another file, '' where it is not known."""
+        """Return ' (line 12)' for a key path, ' (base.toml, line 12)' in another file, '' if it is unknown."""
         if any(key_path(location) == key or key_path(location).startswith(f"{key}.") for key in self.outside):
             return " (set from outside the file)"
         near = [location[:n] for n in range(len(location), 0, -1)]
@@ -256,11 +256,11 @@ def choice(what: str, choices: Callable[[], Sequence[str]], elsewhere: Mapping[s
     Parameters
     ----------
     what
-        What is chosen, for the message.
+        Kind of the choice, for the message.
     choices
-        Returns the choices.
+        Function that returns the choices.
     elsewhere
-        Choices by the names that other programs give them.
+        Choices by their names in other programs.
     """
 
     def check(value: Any) -> Any:
@@ -324,7 +324,7 @@ def beside(value: Any, info: ValidationInfo) -> Any:
 
 
 def existing_file(what: str = "file") -> Callable[[Any, ValidationInfo], Path]:
-    """Return the validator of a path, relative to the folder of the file that names it, at which there must be a file.
+    """Return the validator of the path of an existing file, relative to the folder of the file that names it.
 
     Parameters
     ----------
@@ -352,8 +352,8 @@ Matrix3 = Annotated[tuple[Vector3, Vector3, Vector3], BeforeValidator(rows)]
 def changed(content: FileContent, changes: Mapping[str, Any], where: str, error: type[Exception]) -> FileContent:
     """Return the content of a file with changed values at some key paths.
 
-    The table that holds a key must be in the file; the key itself may be new. Keys that contain dots are found too: the
-    longest matching key is used.
+    The table of a key must be in the file; the key itself may be new. Keys that contain dots are found too: the longest
+    matching key is used.
 
     Raises
     ------
@@ -422,7 +422,7 @@ def first_key(here: dict[str, Any] | list[Any], path: str) -> tuple[Any, str | N
 
 
 def line_numbers(text: str) -> dict[Location, int]:
-    """Return the line, from 1, of each table and key of a valid TOML text; of a value on several lines, the first."""
+    """Return the line, from 1, of each table and key of a valid TOML text; the first line of a multi-line value."""
     found: dict[Location, int] = {}
     table: Location = ()
     n_rows: dict[Location, int] = {}

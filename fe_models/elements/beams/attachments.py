@@ -13,8 +13,8 @@ from fe_models.foundation.records import checked_fields
 
 __all__ = ["PointMass", "RigidLink", "Spring"]
 
-ROUNDING = 1e-14  #: size of an entry over the lever length, below which it counts as zero
-SYMMETRIC = 1e-9  #: relative asymmetry of a given matrix up to which it is rounding
+ROUNDING = 1e-14  #: absolute value of an entry divided by the lever length, below which it counts as zero
+SYMMETRIC = 1e-9  #: largest relative asymmetry of a given matrix that counts as rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,9 +67,9 @@ class PointMass:
 class Spring:
     """Linear spring between two nodes. It acts at one point, to which both nodes are rigidly connected.
 
-    The spring force is stiffness @ d, where d is the motion of the second node's side relative to the first node's side
-    at that point: six components in the axes of the triad. Rigid-body motion therefore causes no force, wherever the
-    nodes are.
+    The spring force is stiffness @ d. The two nodes move the point rigidly by two motions, and d is the motion by the
+    second node minus the motion by the first, six components in the axes of the triad. Rigid-body motion therefore
+    causes no force, for any positions of the nodes.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ class BeamProperty:
     offset
         Offset of the centroid from the line, local (y, z) [m].
     orientation
-        Vector towards local y; None: from the mesh, or else such that z points up.
+        Vector towards local y; None: taken from the mesh; if the mesh has none, z points up.
     shear
         Whether sections shear (Timoshenko); False: they stay normal to the axis (Euler-Bernoulli).
     rotary_inertia

@@ -2,8 +2,8 @@
 
 The local dofs at both ends are u_x u_y u_z theta_x theta_y theta_z of the centroid, with x along the axis and xi = x/L
 in 0..1. Without distributed load, the equilibrium EI theta'' + kappa G A (v' - theta) = 0, kappa G A (v' - theta)' = 0
-has cubic v and quadratic theta. With the end values as constants and Phi = 12 E I / (kappa G A L²), this gives the
-shape functions below, which are exact for end loads. The stiffness is the energy of these fields, hence exact too.
+has the solution of cubic v and quadratic theta. Expressed by the end values, with Phi = 12 E I / (kappa G A L²), this
+gives the shape functions below, which are exact for end loads. Therefore the stiffness from their energy is exact too.
 Torsion and shear act at the shear centre (y_s, z_s): v_s = v - z_s theta_x, w_s = w + y_s theta_x.
 """
 

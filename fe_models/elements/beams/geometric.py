@@ -11,8 +11,8 @@ second-order term of the rotation of their section (`rigid_motion.rotation_work`
 of a spinning shaft.
 
 n(s) and m(s) are the section forces of the loaded element, in equilibrium with the loads along it: n' + q = 0, m' + e ×
-n + mu = 0. The geometric stiffness is then that of the exact section forces, and its work on a rigid rotation is right
-to roundoff.
+n + mu = 0. The geometric stiffness therefore belongs to exact section forces, and its work in a rigid rotation is
+exact to roundoff.
 """
 
 from dataclasses import dataclass
@@ -132,9 +132,9 @@ def point_geometric_stiffness(points: Slices, loads: MassLoads) -> Array:
 def spring_geometric_stiffness(nodes: Array, spring: Spring, u: Array) -> Array:
     """Return the geometric stiffness of a spring, (12, 12), over the dofs of its nodes in the state u, (12,).
 
-    The point on each side moves by d_i = u_i + (R_i - 1) l_i. The axes of the spring rotate with the mean rotation
-    theta of its sides. The second-order term of its extension Rᵀ (d_2 - d_1) is therefore -theta × d + ½ [theta_2 ×
-    (theta_2 × l_2) - …], and that of its twist, the logarithm of R_1ᵀ R_2, is -½ theta_1 × theta_2.
+    Node i moves the point by d_i = u_i + (R_i - 1) l_i. The axes of the spring rotate with the mean rotation theta of
+    both nodes. The second-order term of the extension Rᵀ (d_2 - d_1) is therefore -theta × d + ½ [theta_2 × (theta_2 ×
+    l_2) - …]; the second-order term of the twist, the logarithm of R_1ᵀ R_2, is -½ theta_1 × theta_2.
     """
     first, second = (nodes[node] for node in spring.nodes)
     point = (first + second) / 2 if spring.point is None else np.asarray(spring.point)

@@ -34,7 +34,7 @@ def beam_line(
     taper
         Section at position x, instead of `item.section`; smooth between the breaks.
     breaks
-        Positions at which the section jumps [m].
+        Positions at which the section is discontinuous [m].
 
     Raises
     ------

@@ -86,7 +86,7 @@ class BeamModel:
         Returns
         -------
         Array
-            (n_mesh_nodes, 6, k) [Pa], components xx, yy, zz, yz, xz, xy.
+            Stress, (n_mesh_nodes, 6, k) [Pa], components xx, yy, zz, yz, xz, xy.
         """
         forces = self.section_forces(u)
         n_skin, k = len(self.skin.points), np.shape(u)[1]
@@ -109,9 +109,9 @@ class BeamModel:
         Parameters
         ----------
         lines
-            Of one section, (n,).
+            Lines with the same section, (n,).
         forces
-            Section forces at one end of them, (n, 6, k).
+            Section forces at one end of these lines, (n, 6, k).
         """
         section = self.sections[self.of_line[lines[0]]]
         y_s, z_s = section.shear_center

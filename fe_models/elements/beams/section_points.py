@@ -69,9 +69,9 @@ def section_points(body: FEBody, lines: Iterable[int]) -> FEBody:
     Parameters
     ----------
     body
-        Made by `beam_body`, coupled or not.
+        Body made by `beam_body`, coupled or not.
     lines
-        Indices into `LineMesh.lines`.
+        Indices of lines in `LineMesh.lines`.
 
     Raises
     ------

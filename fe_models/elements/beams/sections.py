@@ -55,7 +55,7 @@ def ring_cap(n: int) -> IntArray:
 def triangulate_polygon(points: Array) -> IntArray:
     """Return triangles of a simple anticlockwise polygon by ear clipping, (n - 2, 3).
 
-    An ear is a convex corner whose triangle holds no other vertex.
+    An ear is a convex corner whose triangle contains no other vertex.
 
     Raises
     ------
@@ -238,7 +238,7 @@ class BoxSection:
     def properties(self, nu: float) -> SectionProperties:
         """Return the properties; J = 4 A_m² / ∮ ds/t (Bredt) + ∮ t³ ds / 3, A_m within the middle line.
 
-        Corners are taken as sharp-edged strips, so J is 1 % low for walls of 1/50 of the width, and 3 % low for 1/12.
+        Corners are treated as sharp-edged strips, so J is 1 % too low if walls are 1/50 of the width, 3 % if 1/12.
         """
         b, h, t_w, t_f = self.width, self.height, self.web, self.flange
         b_i, h_i = b - 2 * t_w, h - 2 * t_f

@@ -32,13 +32,13 @@ def make_skin(
     Parameters
     ----------
     nodes, lines
-        Of the mesh, (n_nodes, 3) and (n_lines, 2).
+        Nodes and lines of the mesh, (n_nodes, 3) and (n_lines, 2).
     geometry
         Ends and axes of the lines.
     of_line
         Section of each line, (n_lines,).
     sections
-        The sections, which give the outlines.
+        Sections with their outlines.
     """
     size = float(np.linalg.norm(np.ptp(nodes, axis=0))) or 1.0
     rings: dict[

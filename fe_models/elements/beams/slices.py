@@ -6,8 +6,8 @@ dm (o: offset from c) and motion u + theta × o contributes to the Gram matrix o
     m a_0 a_0ᵀ + Σ_f E_f a_f a_fᵀ,   a_0 = [1, c, u],   a_f = [0, e_f, theta × e_f],
 
 where E_f, e_f are principal values and axes of E. Its mass matrix is m |u|² + thetaᵀ J theta with J = tr(E) 1 - E. Both
-come from the same numbers, so Σ_a S_aa,kl = phi_kᵀ M phi_l to roundoff. An inertia J given without a shape has E =
-tr(J)/2 1 - J. Its principal values may be negative, which the formulas allow.
+follow from the same numbers, so Σ_a S_aa,kl = phi_kᵀ M phi_l to roundoff. If only an inertia J is given, E = tr(J)/2 1
+- J. Its principal values may be negative, which the formulas allow.
 """
 
 from dataclasses import dataclass

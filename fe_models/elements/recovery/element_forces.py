@@ -127,12 +127,12 @@ class ElementGroup:
     (`BeamModel.section_forces`). "shell resultant": in local axes, averaged over the points of the stiffness
     (`ShellCells.resultants`). "spring force": stiffness times the motion of the second side relative to the first, in
     the axes of the spring; tension is positive. "beam strain", "shell strain": the strains that belong to these forces
-    (`beam_strains`, `shell_strains`). "element stress", "element strain": of solid cells, at the centre, in mesh axes.
+    (`beam_strains`, `shell_strains`). "element stress", "element strain": at the centre of solid cells, in mesh axes.
     """
 
     quantity: str
     part: str  #: cell type, and name of the part if the body has several; "" if not needed
-    names: tuple[str, ...]  #: user's name of each element; without number "part 1 3", which ends with its index
+    names: tuple[str, ...]  #: user's name of each element; if it has no number, part and index, such as "part 1 3"
     numbers: IntArray  #: user's number of each element, (n,); -1: none
     groups: Mapping[str, IntArray]  #: elements of the group in each set of the user
     components: tuple[str, ...]

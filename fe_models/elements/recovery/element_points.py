@@ -1,14 +1,14 @@
 """Stress points of elements: ends of beams at their section points, corners of shells on both faces, nodes of solids.
 
-The stress at a node is an average over the adjoining elements. Where a frame branches, a bending moment is applied or a
-surface bends, parts of it cancel. A strength assessment looks at each element separately:
+The stress at a node is an average over the adjoining elements. Parts of it cancel where a frame branches, a bending
+moment is applied, or a surface is folded. A strength assessment needs the stress of each element separately:
 
 (1) beams: every section point at both ends, from the section forces of that element, sigma_xx = N/A + My z/Iy - Mz
     y/Iz, tau from shear forces and Saint-Venant torsion; warping stress is neglected
 (2) shells: every corner of every cell at top and bottom, from the resultants extrapolated linearly to the corner
-(3) solids: every node of every cell, extrapolated within the cell without a mean over its neighbours
-(4) borders of solids: where materials meet, the mean over the cells of each material by itself; stress jumps there, and
-    the stress of the node is that of the stiffest
+(3) solids: every node of every cell, extrapolated within the cell without averaging over neighbours
+(4) nodes of solids where materials meet: one point for each material, averaged over its cells only, because stress is
+    discontinuous there, and the nodal stress is that of the stiffest material
 """
 
 from collections.abc import Iterable
@@ -167,7 +167,7 @@ def element_points(body: FEBody, at: Iterable[int | str] = (ALL,)) -> FEBody:
         Body of beams, shells or solids, coupled or not, welded, joined or neither.
     at
         Numbers of elements, or names of sets or parts; "all" selects all beams and shells, or all solid cells of a body
-        that has no others; "borders" selects the nodes of solids at which materials meet, with a point for each.
+        that has no others; "borders" selects the nodes of solids at which materials meet, with a point per material.
 
     Raises
     ------
@@ -237,8 +237,8 @@ def beam_ends(where: str, group: ElementGroup, model: BeamModel, lines: IntArray
         section = model.sections[model.of_line[own[0]]]
         if not section.is_outline_known:
             raise BeamError(
-                f"{where}: beam {group.names[own[0]]} has a section given by its numbers, and no outline: its outer "
-                "fibres are not known; give outline = [[y, z], ...] in its table, or leave its elements out"
+                f"{where}: beam {group.names[own[0]]} has a section given by numbers without outline, so its outer "
+                "fibres are unknown; give outline = [[y, z], ...] in its table, or leave its elements out"
             )
         for line in own.tolist():
             for end, word in enumerate(ENDS):
@@ -273,10 +273,7 @@ def solid_nodes(body: FEBody, group: ElementGroup, model: SolidModel, rows: IntA
 
 
 def material_borders(body: FEBody, group: ElementGroup) -> list[MaterialBorders]:
-    """Return the material borders of the solid model of a group, once for all its cell types.
-
-    None if there are none.
-    """
+    """Return the material borders of the solid model of a group, once for all its cell types; may be empty."""
     model = group.source
     if not isinstance(model, SolidModel) or group.kind != next(iter(model.mesh.cells)):
         return []

@@ -87,7 +87,7 @@ def shell_body(
         If a group is unknown; if cells have no thickness or two thicknesses, have no area, or are folded or warped; if
         a node has no attached element; or if cells are nearly normal to the direction of their layup.
     SectionError, BeamError
-        As `beam_body` raises them, for the stiffeners and the attachments.
+        As for `beam_body`, for stiffeners and attachments.
     """
     mesh = as_shell_mesh(mesh)
     used, of_cell = assign_shell_properties(mesh, properties)

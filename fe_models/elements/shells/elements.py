@@ -25,8 +25,8 @@ __all__ = ["CellPlanes", "ShellCells", "cell_planes", "shell_cells"]
 class CellPlanes:
     """Planes of n cells of one type with c corners.
 
-    The corners of the plane are connected to the nodes by rigid arms: normal to the plane where four nodes are warped,
-    and along the offset of the middle surface. u_corner = u_node + theta_node × lever, so rigid motion is always exact.
+    Rigid arms connect the corners of the plane to the nodes: normal to the plane if four nodes are warped, and along
+    the offset of the middle surface. u_corner = u_node + theta_node × lever, so rigid motion is always exact.
     """
 
     R: Array  #: local axes x, y, z (normal) as columns, mesh axes, (n, 3, 3)
@@ -308,16 +308,15 @@ def translations(planes: CellPlanes, N: Array, E: Array, shape: FlatShape, share
     """Return translations of the middle surface per unit nodal dof, mesh axes, (n, p, 3, c, 6).
 
     u = Σ N_i (u_i + theta_i × lever_i) - 1/8 Σ_sides E_k (theta_j - theta_i) × (x_j - x_i). On each side this is the
-    parabola of the cubic through the ends with their rotations, normal to the plane (bending) and in it (drilling). So
-    u is quadratic along sides, and a rigid rotation is exact.
+    quadratic part of the cubic through the ends with their rotations, normal to the plane (bending) and in the plane
+    (drilling). So u is quadratic along sides, and a rigid rotation is exact.
 
     Parameters
     ----------
     planes
         Planes of the cells.
     N, E
-        Functions of corners (N) and sides (E), or their derivatives with respect to one coordinate: (p, c) or (n, p,
-        c).
+        Functions of corners (N) and sides (E), or their derivatives by one coordinate, (p, c) or (n, p, c).
     shape
         Shape functions, which name the ends of the sides.
     share

@@ -9,10 +9,10 @@ and b along its axes e_a, the work is
     +  Q_a [u,a·psi + ½ e_a·(theta × (theta × n))]
 
 The loads also do work on the second-order term of the rotation, through the normal and through the levers between nodes
-and middle surface (`rigid_motion.rotation_work`). The nodal forces of the cell do so too. The drilling stress of quads,
-which vanishes as the mesh is refined, is neglected. Q is the shear force that balances the nodal forces normal to the
-cell. These elements carry most of it through the change of M along their sides, where the strain at their centre does
-not show it.
+and middle surface (`rigid_motion.rotation_work`), and so do the nodal forces of the cell. The drilling stress of quads
+is neglected, because it vanishes as the mesh is refined. Q is the shear force that balances the nodal forces normal to
+the cell, not the product of shear stiffness and shear strain: in these elements the change of M along the sides
+balances most of the nodal forces.
 """
 
 from functools import cache
@@ -75,10 +75,10 @@ def cell_geometric_stiffness(cells: ShellCells, rows: slice, u: Array, loads: Ma
 
 
 def _missing_shear(cells: ShellCells, rows: slice, forces: Array, Q: Array, weights: Array) -> Array:
-    """Return the part of the weighted shear force, (m, p, 2, k), that Q lacks for balance with the nodal forces.
+    """Return the weighted shear force, (m, p, 2, k), that must be added to Q for balance with the nodal forces.
 
-    It is the gradient of Σ c_i N_i, where ∫ (Q + ∇ Σ c_j N_j)·∇N_i = f_z,i at every corner i. The constant in c is free
-    and set to zero.
+    It is the gradient of Σ c_i N_i, where ∫ (Q + ∇ Σ c_j N_j)·∇N_i = f_z,i at every corner i. The constant part of c is
+    arbitrary and set to zero.
     """
     planes = cells.planes[rows]
     n, c, k = len(planes.R), planes.xy.shape[1], forces.shape[2]
@@ -103,11 +103,11 @@ def _contracted(fields: Array, units: Array, weights: Array) -> Array:
     Parameters
     ----------
     fields
-        (n_cells, n_points, c, n).
+        Values of the fields, (n_cells, n_points, c, n).
     units
-        Symmetric, (n_units, c, c).
+        Symmetric matrices U_r, (n_units, c, c).
     weights
-        (n_cells, n_points, n_units, k).
+        Weight of each point, unit work and state, (n_cells, n_points, n_units, k).
     """
     from fe_models.body.work_kernels import work_products
 

@@ -12,8 +12,8 @@ with D* = D - B A⁻¹ B. Two cylindrical bendings M_x,x = Q_x, M_y,y = Q_y give
     tau(z) = -∫ div sigma dz = F(z) (Q_x, Q_y),
 
 which is continuous and vanishes at both faces. Its energy gives the shear stiffness H = (∫ Fᵀ G⁻¹ F dz)⁻¹, which is 5/6
-G t for one isotropic layer. No shear correction factor has to be chosen. For angle plies H depends slightly on the
-layup axes, because the two bendings are taken along them.
+G t for one isotropic layer. No shear correction factor is needed. For angle plies H depends slightly on the layup axes,
+because the two cylindrical bendings are about these axes.
 """
 
 from collections.abc import Callable
@@ -42,7 +42,7 @@ class ShellLaw:
     H: Array  #: transverse shear stiffness, (2, 2) [N/m]
     mass: float  #: mass per area [kg/m²]
     centre: float  #: height of the centre of mass above the middle surface [m]
-    spread: float  #: second moment of the mass about its centre along the normal, over the mass [m²]
+    spread: float  #: second moment of the mass about its centre along the normal, divided by the mass [m²]
 
     @property
     def thickness(self) -> float:
@@ -86,7 +86,7 @@ class ShellLaw:
         z
             Height above the middle surface [m].
         layer
-            Index of the layer, from the bottom, whose stress is wanted.
+            Index of the layer, from the bottom.
         """
         S = np.zeros((5, 8))
         if not self.layers:
@@ -192,7 +192,7 @@ def rotated_elasticity(material: AnyMaterial, angle: float) -> Array:
     Parameters
     ----------
     material
-        Its axes 1 and 2 lie in the layer; axis 1 is at the angle.
+        Material whose axes 1 and 2 lie in the layer; axis 1 is at the angle.
     angle
         Angle from the first layup axis, right-handed about the normal [degree].
     """

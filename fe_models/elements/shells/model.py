@@ -66,7 +66,7 @@ class ShellModel:
         Returns
         -------
         Array
-            (n_nodes + n_skin, 6, k) [Pa], components xx, yy, zz, yz, xz, xy.
+            Stress, (n_nodes + n_skin, 6, k) [Pa], components xx, yy, zz, yz, xz, xy.
         """
         return self.means_of_corners(u, ShellCells.stress)
 

@@ -22,7 +22,7 @@ def orient_normals(mesh: ShellMesh) -> ShellMesh:
     Parameters
     ----------
     mesh
-        Any shell mesh.
+        Shell mesh; any orientation of its cells.
     """
     kinds = list(mesh.cells)
     edges = cell_edges(tuple(mesh.cells[kind] for kind in kinds))

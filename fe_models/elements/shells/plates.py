@@ -24,9 +24,9 @@ __all__ = ["quad_strains", "triangle_strains"]
 #
 # Plate [1]_: along each side the rotation is quadratic and the shear strain constant, as in the triangle
 # (`fe_models.elements.shells.strains.plate_sides`). Inside, the rotation is bilinear plus the contribution of the
-# sides, and the covariant shear strains are linear between those of opposite sides. Quads and triangles therefore have
-# the same rotation on a shared side. A plate of both passes the patch test of constant twist; a mixture of these
-# triangles with quads that have straight sides (MITC4) does not.
+# sides, and the covariant shear strains are linear between opposite sides. Quads and triangles therefore have the same
+# rotation on a shared side. A plate of both passes the patch test of constant twist. A mixture of these triangles with
+# MITC4 quads, whose rotation is linear along sides, does not.
 #
 # Membrane: the displacement is u = Σ N_i u_i + (1 - xi²) a_1 + (1 - eta²) a_2 with internal vectors a. Their gradients
 # use the Jacobian at the centre, scaled by its determinant, so that their mean is zero and constant strain is exact for
@@ -118,9 +118,9 @@ def _condensed_modes(xy: Array, points: Array, det: Array, weights: Array, law: 
 
 # the three-node element: discrete Kirchhoff-Mindlin plate (DKMT), optimal membrane with drilling (ANDES) --------------
 # Plate [1]_: along each side the rotation is quadratic and the shear strain constant
-# (`fe_models.elements.shells.strains.plate_sides`). Thin triangles are then those of discrete Kirchhoff theory, and
-# thick triangles deform in shear, without locking. The shear field inside is linear, with constant tangential strain on
-# every side.
+# (`fe_models.elements.shells.strains.plate_sides`). Thin triangles then follow discrete Kirchhoff theory, and thick
+# triangles deform in shear, without locking. The shear field inside is linear, with constant tangential strain on every
+# side.
 #
 # Membrane [2]_: the element has two parts. The constant part has L lumped from linear side displacements and the
 # drilling rotations (alpha_b = 3/2). The linear part depends on the hierarchical drilling rotations theta~ = theta -

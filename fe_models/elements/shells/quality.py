@@ -10,7 +10,7 @@ from fe_models.foundation.arrays import Array, IntArray
 __all__ = ["WARP_LIMIT", "CellQuality", "cell_quality"]
 
 WARP_LIMIT = 20.0  #: angle between the two halves of a quad above which the cell is rejected [degree]
-FLAT = 1e-9  #: area over the square of the cell size, below which the cell has no area
+FLAT = 1e-9  #: area divided by the square of the cell size, below which the cell has no area
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +21,7 @@ class CellQuality:
     is_degenerate: NDArray[np.bool_]  #: whether a cell has no area, (n,) bool
     is_folded: NDArray[np.bool_]  #: whether a quad has an inner angle of 180 degrees or more, (n,) bool
     warp: Array  #: largest angle between two halves of a quad, for both diagonals, (n,) [degree]
-    aspect: Array  #: longest side over shortest side, (n,)
+    aspect: Array  #: longest side divided by shortest side, (n,)
 
 
 def cell_quality(nodes: Array, cells: IntArray) -> CellQuality:

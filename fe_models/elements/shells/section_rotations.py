@@ -3,18 +3,18 @@ r"""Section rotations of a stiffener that differ from the rotations of its wall.
 A wall supports a beam along a line. The displacement of the line and the rotation about it are common to both. The
 other rotations of a section follow the axis of the beam. If the wall twists by theta_x', the shear centre of a section
 with lever r from the line moves by theta_x × r, so its axis rotates relative to the wall's line by theta_x' e_x × (e_x
-× r) = -theta_x' r. About the normal n, the wall has in the limit no rotation of its own but the mean ½ (v,x - u,y) of
-two slopes, while the axis of the beam rotates by v,x alone. A section that had to rotate with the node would shear by
-that difference, with a torsional stiffness of GA r² instead of GJ. A coarse mesh hides this, because the drilling
-rotation of large cells is compliant; a fine mesh does not.
+× r) = -theta_x' r. About the normal n, the rotation of the wall tends to the mean ½ (v,x - u,y) of two slopes as the
+mesh is refined, while the axis of the beam rotates by v,x alone. A section that had to rotate with the node would shear
+by this difference, with a torsional stiffness of GA r² instead of GJ. The effect is small in a coarse mesh, where the
+drilling rotation of large cells is compliant, but not in a fine mesh.
 
 A section therefore rotates independently about the normal, and about its lever where the lever is not along the normal.
 Its other rotations are those of the node:
 
     theta_b = theta_s + A (A_C)⁻¹ (phi - theta_s,C)
 
-A, (3, k), holds orthonormal axes normal to all lines at the node. C are k components in which they are independent. phi
-is the section's own rotation about these mesh axes, so that rigid motion has phi = theta_C.
+The columns of A, (3, k), are orthonormal axes normal to all lines at the node. C are k components in which these axes
+are independent. phi is the section's own rotation about the mesh axes C, so rigid motion has phi = theta_C.
 """
 
 from dataclasses import dataclass
@@ -33,9 +33,9 @@ __all__ = ["SectionRotations", "own_axes", "rotations_of_sections"]
 
 #: cosine of the angle between normals at a node, below which the wall counts as folded
 SMOOTH = np.cos(np.deg2rad(40.0))
-ALONG = 0.1  #: share of the lines at a node along an axis, above which no section rotates independently about it
+ALONG = 0.1  #: component of the lines at a node along an axis, above which no section rotates independently about it
 APART = 0.1  #: sine of the angle between two axes, below which they count as the same axis
-ON_LINE = 1e-6  #: lever over the length of the line, below which a section lies on the line
+ON_LINE = 1e-6  #: lever divided by the length of the line, below which a section lies on the line
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +92,8 @@ def own_axes(
     """Return the axes about which sections at a node rotate independently, (3, k), orthonormal, k = 0..2.
 
     (1) possible axes: normal to the lines at the node, because the wall transmits its twist to the lines
-    (2) desired axes: the normal of a smooth wall, and the levers of lines that continue beyond the node (where a line
-        ends, its moments must reach the wall)
+    (2) desired axes: the normal of a smooth wall, and the levers of lines that continue beyond the node (not of lines
+        that end there, because their moments must be transmitted to the wall)
     (3) result: the projection of the desired axes onto the span of the possible axes
 
     Parameters

@@ -56,9 +56,9 @@ def shell_points(body: FEBody, cells: Mapping[str, Iterable[int]]) -> FEBody:
     Parameters
     ----------
     body
-        Made by `shell_body`, coupled or not.
+        Body made by `shell_body`, coupled or not.
     cells
-        Indices into `ShellMesh.cells`, by cell type, such as a group `mesh.cell_sets["lug"]`.
+        Indices of cells in `ShellMesh.cells`, by cell type, such as a group `mesh.cell_sets["lug"]`.
 
     Raises
     ------
@@ -74,19 +74,19 @@ def layer_stress(body: FEBody, u: Array, cells: Mapping[str, Iterable[int]], lay
     Parameters
     ----------
     body
-        Made by `shell_body`, coupled or not.
+        Body made by `shell_body`, coupled or not.
     u
         Displacement columns over the dofs of the body, (n_dof, k).
     cells
-        Indices into `ShellMesh.cells`, by cell type.
+        Indices of cells in `ShellMesh.cells`, by cell type.
     layer
         Index of the layer, 0 at the bottom.
 
     Returns
     -------
     Array
-        (n_cells, 2, 5, k) [Pa]: sigma_1 sigma_2 tau_12 tau_13 tau_23 at the bottom and at the top of the layer. Axis 1
-        is at the angle of the layer, and axis 3 is the normal. Cells keep the given order.
+        Stress, (n_cells, 2, 5, k) [Pa]: sigma_1 sigma_2 tau_12 tau_13 tau_23 at the bottom and at the top of the layer.
+        Axis 1 is at the angle of the layer, and axis 3 is the normal. Cells keep the given order.
 
     Raises
     ------

@@ -23,7 +23,7 @@ __all__ = [
     "symmetric",
 ]
 
-#: of a stiffness matrix scaled to a unit diagonal: largest asymmetry, and largest eigenvalue that counts as zero
+#: largest asymmetry of a stiffness matrix scaled to a unit diagonal, and largest eigenvalue that counts as zero
 ROUNDING = 1e-9
 
 
@@ -262,7 +262,7 @@ def _direction(where: str, given: object) -> tuple[float, ...]:
 def _positive_matrix(where: str, given: object, n: int) -> Array:
     """Return a matrix, (n, n), after checking that it is symmetric and positive definite.
 
-    Its units differ from row to row; the test of rounding takes each row relative to its diagonal entry.
+    Its units differ from row to row, so the test for rounding scales it to a unit diagonal.
     """
     matrix = np.array(given, dtype=float)
     if matrix.shape != (n, n) or not np.isfinite(matrix).all():

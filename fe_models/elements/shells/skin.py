@@ -66,7 +66,7 @@ def make_shell_skin(nodes: Array, groups: tuple[ShellCells, ...]) -> ShellSkin:
     """Return the skin of all cells.
 
     (1) corners of neighbouring cells at a node share their points if the cells have the same thickness, offset and
-        sense of the normal, and meet at less than 40 degrees; folds, joints of three cells and steps stay sharp
+        side of the normal, and meet at less than 40 degrees; folds, joints of three cells and steps remain sharp
     (2) the points are the mean of the corners of the middle surface, plus and minus half of the thickness along the
         mean normal
     (3) triangles cover both faces, and the rim along every edge where the skin ends

@@ -116,7 +116,7 @@ def with_frame(shell: FEBody, model: ShellModel, frame: FEBody, nodes: IntArray,
     nodes
         Shell node of each node of the frame, (n_frame_nodes,).
     turns
-        The map from shell nodes to the nodes of the frame, and the independent rotations.
+        Map from shell nodes to the nodes of the frame, and the independent rotations.
 
     Returns
     -------

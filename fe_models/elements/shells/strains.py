@@ -78,8 +78,7 @@ class PlateSides:
         Parameters
         ----------
         gradients
-            Gradients of the side functions (1 at the mid-point of a side, 0 on others), with respect to x, y, (n, p,
-            n_sides, 2).
+            Gradients of the side functions (1 at the mid-point of a side, 0 on others) by x, y, (n, p, n_sides, 2).
         """
         c, s = np.moveaxis(self.along, -1, 0)
         by_x, by_y = gradients[..., 0], gradients[..., 1]

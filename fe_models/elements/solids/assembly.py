@@ -1,10 +1,10 @@
 """Stiffness and consistent mass of a mesh of solid elements, assembled directly into compressed sparse form.
 
-(1) number the element nodes of all elements consecutively, and list for each node the places where it occurs;
-(2) derive the graph of the nodes: row i holds the nodes that share an element with node i, ascending;
+(1) number the element nodes of all elements consecutively, and list for each node the positions at which it occurs;
+(2) derive the graph of the nodes: row i lists the nodes that share an element with node i, ascending;
 (3) compute element matrices in batches of bounded size, in threads;
-(4) after each batch, add the contributions of the elements to the rows of each node, in the order of the elements. No
-    two threads write to one entry, and the sums do not depend on the number of threads, so results are bitwise
+(4) after each batch, add the contributions of the elements to the rows of each node, in the order of the elements. Only
+    one thread writes to an entry, and the sums do not depend on the number of threads, so results are bitwise
     reproducible;
 (5) assemble the scalar mass M_s once and expand it by components, M = M_s ⊗ 1₃.
 """
@@ -73,9 +73,9 @@ def assemble(
     Parameters
     ----------
     mesh
-        Every node must belong to a solid cell.
+        Mesh in which every node belongs to a solid cell.
     materials
-        The materials in use.
+        Materials in use.
     of_cell
         Index of the material of each cell, (n_cells,), by cell type.
     incompatible
@@ -84,7 +84,7 @@ def assemble(
         Names in `INTEGRATIONS` and `MASSES` of `fe_models.elements.solids.elements`. A lumped element mass is the
         diagonal of the consistent mass, scaled to the mass of the element.
     progress
-        Called with the finished fraction.
+        Callback that receives the finished fraction.
 
     Returns
     -------
@@ -225,8 +225,9 @@ def lumped_mass(M_e: Array) -> Array:
 def kernel_tables(element: ReferenceElement) -> tuple[tuple[np.ndarray, ...], ...]:
     """Return the tables for the kernel: for affine elements, and for stiffness and mass of curved elements.
 
-    The tables of affine elements are the reference cell's nodes, (n_nodes, 3), those at e_1, e_2, e_3, (3,), and its
-    integrals for pairs b >= a, row by row: ∫ ∂N_a/∂xi_k ∂N_b/∂xi_l in row 3 k + l, (9, n_pairs), and ∫ N_a N_b.
+    The tables of affine elements are the nodes of the reference cell, (n_nodes, 3), the indices of the nodes at e_1,
+    e_2, e_3, (3,), and integrals over the cell for pairs b >= a, row by row: ∫ ∂N_a/∂xi_k ∂N_b/∂xi_l in row 3 k + l,
+    (9, n_pairs), and ∫ N_a N_b.
     """
     stiffness, mass, nodes = element.stiffness, element.mass, CELL_SHAPES[element.kind].nodes
     on_axes = np.array([int(np.flatnonzero((nodes == axis).all(axis=1))[0]) for axis in np.eye(3)])

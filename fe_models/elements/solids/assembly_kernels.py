@@ -1,7 +1,7 @@
 """Compiled loops of the assembly, imported only when used, because importing numba takes half a second.
 
-Every kernel works on one share of the rows, columns or elements, `part` of `n_parts`, and writes only to that share.
-The shares run in threads without locks, and the order of additions to an entry never depends on the threads.
+Every kernel processes one share of the rows, columns or elements, `part` of `n_parts`, and writes only to this share.
+The shares run in threads without locks, and the order of additions to an entry does not depend on the threads.
 """
 
 import numpy as np
@@ -261,7 +261,7 @@ def scatter_elements(
     """Add the element matrices of the consecutive elements `cells` to the rows of the nodes of this part.
 
     Row 3 i + c of the stiffness has 3 entries for each of the m_i neighbours of node i. Entry (c, d) of the p-th
-    neighbour is therefore at 9 row_start[i] + 3 m_i c + 3 p + d of K_data, and no conversion is needed.
+    neighbour is therefore at 9 row_start[i] + 3 m_i c + 3 p + d of K_data, which is the final storage.
     cursor: for each node, its first place in `places` that has not been added yet; workspace: (n_parts, n_nodes).
     """
     where = workspace[part]  # position of a node among the neighbours of another node

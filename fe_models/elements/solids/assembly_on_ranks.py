@@ -78,7 +78,7 @@ def assemble_on_ranks(
     materials, of_cell
         As for `fe_models.elements.solids.assembly.assemble`.
     options
-        Its keyword arguments.
+        Keyword arguments of this function.
     """
     kinds = require_assemblable(mesh)
     lists = {kind: np.ascontiguousarray(mesh.cells[kind], dtype=np.int32) for kind in kinds}
@@ -86,7 +86,7 @@ def assemble_on_ranks(
     ranks.store[KEY] = [mesh_part(mesh, lists, of_cell, order, rows, rank) for rank in range(ranks.size)]  # (2)
     try:
         asked(ranks, assemble_here, materials, dict(options))  # (3)
-    # the message refers to a part of the mesh; a single process finds the same fault in the complete mesh
+    # the message refers to a part of the mesh; repeat the assembly in one process, where it refers to the whole mesh
     except MeshError:
         asked(ranks, forget_here)  # drop the rows on ranks without an error
         assemble(mesh, materials, of_cell, **options)

@@ -53,7 +53,7 @@ __all__ = ["SolidModel", "nodal_rotation", "scalar_mass_gram", "solid_body"]
 # (3) at a node, average over its cells
 
 
-FLAT = 1e-9  #: det J over the cube of its largest entry, below which a cell has no gradient at its node
+FLAT = 1e-9  #: det J divided by the cube of the largest entry of J, below which a cell has no gradient at its node
 
 
 def nodal_rotation(mesh: Mesh, u: Array, nodes: IntArray) -> Array:
@@ -113,10 +113,10 @@ class SolidModel:
 
     @cached_property
     def of_node(self) -> IntArray:
-        """Material whose stress each node has, (n_nodes,): the first one with the largest modulus at the node.
+        """Material whose stress is used at each node, (n_nodes,): the first one with the largest modulus at the node.
 
-        Stress jumps where materials meet, and one value per node can show one side only. The stiffer side usually has
-        the larger stress, and a fixed choice keeps the stress linear in the displacement.
+        Stress is discontinuous where materials meet, and one value per node can only represent one side. The stiffer
+        side usually has the larger stress, and a fixed choice keeps the stress linear in the displacement.
         """
         order = np.argsort([-material.E for material in self.materials], kind="stable")
         rank = np.empty(len(order), np.int64)
@@ -250,7 +250,7 @@ def solid_body(
         bricks; or "lumped" to the diagonal. Too few points leave some motions without mass: the mass matrix is then
         singular.
     progress
-        Receives the finished fraction of the assembly, 0 to 1.
+        Callback that receives the finished fraction of the assembly, 0 to 1.
     ranks
         Processes that assemble parts of the mesh and keep their rows of K and M (`SpreadMatrix`). None, or a single
         rank: K and M are ordinary matrices.
@@ -258,7 +258,7 @@ def solid_body(
     Returns
     -------
     FEBody
-        Its element model is a `SolidModel`, and its surface is the boundary triangles.
+        Body whose element model is a `SolidModel`; its surface consists of the boundary triangles.
 
     Raises
     ------
@@ -302,10 +302,10 @@ def scalar_mass_gram(M_s: SymmetricProduct | RowsProduct, nodes: Array, columns:
     Parameters
     ----------
     M_s
-        Product with the scalar mass, (n_nodes, n_nodes) [kg]; it is made with a few columns at a time.
+        Product with the scalar mass, (n_nodes, n_nodes) [kg]; it is applied to a few columns at a time.
     nodes, columns
-        Rows of X and of u_x, u_y, u_z for all nodes, (n_nodes, 3 k) [m]. On one of several ranks: for its own nodes;
-        the results of all ranks are then summed.
+        Rows of X and of u_x, u_y, u_z for all nodes, (n_nodes, 3 k) [m]. On several ranks: rows of the rank's own
+        nodes; the results of all ranks must then be summed.
     n_rows
         Number of rows of M_s, on all ranks.
     """
@@ -351,8 +351,8 @@ def gram_here(ranks: Ranks, key: str, nodes: Part, u: Part, n_rows: int) -> Arra
 def node_volumes(mesh: Mesh) -> Array:
     """Return the volume that each node represents, (n_nodes,) [m³]: element volumes, distributed by ∫N_n².
 
-    The consistent weight ∫N_n is negative at the corners of quadratic elements. The shares are those of the reference
-    cell. Volumes are integrated with the stress points, which is exact for cells with straight edges.
+    The consistent weight ∫N_n would be negative at the corners of quadratic elements. The shares are computed in the
+    reference cell. Volumes are integrated with the stress points, which is exact for cells with straight edges.
     """
     volumes = np.zeros(len(mesh.nodes))
     for kind, cells in mesh.cells.items():

@@ -22,7 +22,7 @@ __all__ = [
     "INTEGRATIONS", "MASSES", "ReferenceElement", "ShapeTable", "reference_centre", "reference_element", "shape_table",
 ]  # fmt: skip
 
-#: polynomial degree; wedges: of triangle and line; pyramids: numbers of points across and up
+#: polynomial degree; for wedges degrees in triangle and line; for pyramids numbers of points across and up
 Degree = int | tuple[int, int]
 
 # scikit-fem 12 labels its tetrahedron tables 5 to 8 one degree too high (measured; a test checks the tables used here),
@@ -53,7 +53,7 @@ REDUCED: dict[str, tuple[str, Degree]] = {
     "wedge15": ("wedge", (2, 5)),  # 3 x 3
     "pyramid": ("pyramid", (2, 2)),  # 8
     "pyramid13": ("pyramid", (2, 2)),  # 8
-}  #: fewest points that programs use; straight-edged cells keep their full stiffness, except wedges and bricks
+}  #: fewest points that programs use; straight-edged cells other than wedges and bricks have the full stiffness
 INTEGRATIONS = ("full", "reduced")  #: rules for the integration of the stiffness
 #: consistent; with the points of the reduced stiffness; 14 points for 20-node bricks (others consistent); diagonal
 MASSES = ("consistent", "reduced", "14-point", "lumped")

@@ -94,7 +94,7 @@ def scalar_geometric_matrices(
     tensors
         Matrix of every material that maps strain to stress, (n_materials, 6, 6).
     parts
-        The cells with their quadrature.
+        Cells with their quadrature.
     """
     from fe_models.elements.solids.stress_kernels import write_scalar_matrices
 
@@ -119,8 +119,8 @@ def scalar_geometric_matrices(
 # geometric ------------------------------------------------------------------------------------------------------------
 
 
-#: distance of a middle node from the middle of its edge, over the cell's size, above which a tetrahedron is curved;
-#: below it the error of the geometric stiffness over a rotation is of this size
+#: distance of a mid-side node from the middle of its edge, divided by the cell size, above which a tetrahedron is
+#: curved; for cells below it, the geometric stiffness has a relative error of this size in a rotation
 CURVED = 1e-9
 CHUNK_BYTES = 1.5e6  #: size of the products that a thread has at a time; they must fit in its cache [bytes]
 
@@ -207,9 +207,9 @@ def integrated_cells(
 ) -> list[IntegratedCells]:
     """Return the cells of a type with the quadrature of their geometric stiffness.
 
-    The work on a rigid rotation must equal that of the nodal forces K u to roundoff. At the points of the stiffness it
-    does. In a quadratic tetrahedron with straight edges four points are enough, those of the stress: there
-    sigma · grad N has degree 2. A curved one takes the points of its stiffness.
+    In a rigid rotation, the geometric stiffness must do the same work as the nodal forces K u, to roundoff. This holds
+    with the quadrature points of the stiffness. For a quadratic tetrahedron with straight edges the four stress points
+    suffice, because sigma · grad N has degree 2. A curved tetrahedron uses the points of its stiffness.
     """
     cells = mesh.cells[kind]
     if not len(cells):
@@ -271,7 +271,7 @@ def spread_geometric_stiffness(
     Phi
         Distributed columns, three rows per node in the order of the nodes, (3 n_nodes, n).
     rules
-        Keyword arguments of that function.
+        Keyword arguments of `projected_geometric_stiffness`.
     """
     rows = parts.layout.rows
     if Phi.layout.rows.starts != tuple(3 * start for start in rows.starts):

@@ -1,18 +1,18 @@
 r"""Eight-node brick with incompatible modes, which bends as a beam does.
 
-A trilinear field cannot bend: the displacement u = x y must come with v = -x²/2. Without it, a cell of length l in a
-wall of height h has a parasitic shear energy of (G/E)(l/h)² times the bending energy, however many cells lie across the
-wall. Three internal vectors a_m provide the missing field [1]_:
+A trilinear field cannot represent bending, because the displacement u = x y requires v = -x²/2. Without this term, a
+cell of length l in a wall of height h has a parasitic shear energy of (G/E)(l/h)² times the bending energy, for any
+number of cells across the wall. Three internal vectors a_m provide the missing field [1]_:
 
     u = Σ N_i u_i + Σ_m (1 - xi_m²) a_m,   xi_m in -1..1
 
 (1) Their gradients are taken with the Jacobian J_0 at the centre, times det J_0/det J [2]_. Then ∫ grad (1 - xi_m²) = 0
-    for any shape, so that constant stress does no work on them and the patch test holds for distorted cells. On a
-    parallelepiped they are the true gradients.
+    for any shape, so constant stress does no work on them, and distorted cells pass the patch test. On a parallelepiped
+    these are the true gradients.
 (2) The a_m minimise the energy, ∫ grad (1 - xi_m²) · sigma = 0, and so are linear in the nodal displacements.
 (3) The gradient of the complete field is then H = B u with one operator per point. Stiffness, stress, nodal forces and
-    geometric stiffness all follow from it. For a rigid rotation a = 0, and by (2) its work equals that of the rotated
-    nodal forces.
+    geometric stiffness all follow from it. For a rigid rotation a = 0, and by (2) the work of the geometric stiffness
+    equals that of the rotated nodal forces.
 
 The internal motion has no mass. The field is not continuous between cells, so frequencies may be too high or too low.
 

@@ -36,15 +36,15 @@ def nodal_stress(
     Parameters
     ----------
     mesh, materials
-        The solid cells, and the materials to which `of_cell` refers.
+        Mesh with its solid cells, and the materials to which `of_cell` refers.
     of_cell
         Index of the material of each cell, (n_cells,), by cell type.
     of_node
-        Index of the material whose stress each node shows, (n_nodes,); see `SolidModel.of_node`.
+        Index of the material whose stress is used at each node, (n_nodes,); see `SolidModel.of_node`.
     u
         Displacement columns, dof 3 i + c is component c of node i, (3 n_nodes, k).
     nodes
-        Nodes whose stress is wanted. Only their elements are visited, and other nodes report zero. None: all nodes.
+        Nodes whose stress is computed, from their elements only; it is zero at other nodes. None: all nodes.
     incompatible
         Whether eight-node bricks have incompatible modes.
     """
@@ -60,7 +60,7 @@ def nodal_stress(
     n_columns = fields.shape[2]
     stress = np.zeros((len(mesh.nodes), 6, n_columns))
     cuts = np.linspace(0, n_columns, min(n_threads(), n_columns) + 1).astype(int) if n_columns else np.zeros(1, int)
-    with ThreadPoolExecutor(n_threads()) as pool:  # each thread owns its columns, so no two threads write to one entry
+    with ThreadPoolExecutor(n_threads()) as pool:  # each thread writes only to its own columns
         for kind, all_cells in mesh.cells.items():
             is_wanted = np.ones(len(all_cells), bool) if nodes is None else wanted[all_cells].any(axis=1)
             cells, material = all_cells[is_wanted], of_cell[kind][is_wanted]
@@ -107,7 +107,7 @@ def add_brick_stress(nodes: Array, cells: IntArray, tensors: Array, shows: Array
     tensors
         Matrix of each cell that maps strain to stress, (n_cells, 6, 6).
     shows
-        Whether each node of each cell shows the material of the cell, (n_cells, 8).
+        Whether the stress at each node of each cell is that of the cell's material, (n_cells, 8).
     u
         Displacement columns, (3 n_nodes, k).
     stress

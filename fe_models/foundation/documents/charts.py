@@ -77,24 +77,24 @@ class LimitLine:
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """What is drawn over the axes.
+    """A chart: its axes, and the items that are drawn over them.
 
     Parameters
     ----------
     x
-        The axis across.
+        Horizontal axis.
     panels
-        The axes upwards, from the top panel to the last.
+        Vertical axes, from the top panel to the last.
     items
         Lines of all panels, or bars, or one matrix.
     height
         Height on a page [px].
     limits
-        Lines and bands.
+        Limit lines and bands.
     names
         Names of the groups of bars.
     has_legend
-        Whether the names of the items are listed.
+        Whether a legend lists the names of the items.
     """
 
     x: Axis

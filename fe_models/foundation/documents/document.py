@@ -27,7 +27,7 @@ class Cell:
     text: str
     kind: str = ""  #: cell kinds, separated by blanks: "n" for numbers, "name", "pass", "warn", "fail", "blank"
     note: str = ""  #: smaller text below
-    badge: str = ""  #: verdict whose colour the badge around the text has
+    badge: str = ""  #: verdict that gives the colour of the badge around the text
     line: tuple[str, str] | None = None  #: colour and dash of a line before the text
     span: int = 1
 
@@ -43,11 +43,11 @@ class TextTable:
     rows
         Text or cells; a second line of a text becomes a note.
     widths
-        Shares of the width of a sheet; empty: as the text needs it.
+        Width of each column as a share of the page width; empty: determined by the text.
     verdict
-        Column that is coloured by its text, one of the verdicts.
+        Column whose texts are verdicts and determine its colours.
     caption
-        A sentence above.
+        Sentence above the table.
     """
 
     headings: Sequence[str]
@@ -136,15 +136,15 @@ class Answer:
     Parameters
     ----------
     text
-        In a sentence.
+        Answer in one sentence.
     verdict
-        "pass", "warn", "fail", or "info" where nothing is judged; its colour.
+        "pass", "warn", "fail", or "info" if there is no verdict; determines the colour.
     badge
-        The verdict in words; empty: none.
+        Verdict in words; empty: none.
     figures
-        Numbers and what they are.
+        Numbers with their meanings.
     notes
-        More sentences.
+        Further sentences.
     """
 
     text: str

@@ -61,7 +61,7 @@ class Table:
     units
         Unit of a column by its name; "" or no entry: none.
     meta
-        What belongs to the table as a whole, in plain types (text, numbers, lists, dictionaries).
+        Data about the whole table in plain types (text, numbers, lists, dictionaries).
 
     Raises
     ------
@@ -332,8 +332,8 @@ BOOLEANS = {"True": True, "False": False}
 def csv_content(table: Table) -> bytes:
     """Return comma-separated values.
 
-    A NaN is an empty cell, and whole numbers beside such gaps have no point. Text that could be read as a number stands
-    in quotes.
+    A NaN is an empty cell. Whole numbers in a column with such gaps are written without decimal point. Text that could
+    be read as a number is quoted.
     """
     parts = list(real_columns(table))
     names = [name for name, _, _ in parts]
@@ -342,7 +342,7 @@ def csv_content(table: Table) -> bytes:
     heads = [csv_text(head(name, unit)) for name, unit, _ in parts]
     lines = [",".join(heads), *(",".join(row) for row in zip(*(cells_of(c) for _, _, c in parts), strict=True))]
     if len(parts) == 1:
-        lines = [line or '""' for line in lines]  # a reader would take an empty line for no row
+        lines = [line or '""' for line in lines]  # a reader would skip an empty line
     return ("\n".join(lines) + "\n").encode()
 
 
@@ -433,7 +433,7 @@ def json_content(table: Table) -> bytes:
 
 
 def json_number(value: Any) -> Any:
-    """Return a number for JSON, which knows no NaN and no infinity."""
+    """Return a number for JSON, which has no NaN and no infinity."""
     if not isinstance(value, float) or math.isfinite(value):
         return value
     return None if math.isnan(value) else str(value)
@@ -455,7 +455,7 @@ def read_json(content: bytes) -> Table:
 
 
 def floats(value: Any) -> float:
-    """Return a number of `json_number`."""
+    """Return the number that `json_number` wrote: None is NaN, "inf" and "-inf" are infinities."""
     return math.nan if value is None else float(value)
 
 
@@ -541,7 +541,7 @@ def read_mat(content: bytes) -> Table:
 
 
 def parquet_content(table: Table) -> bytes:
-    """Return Parquet, with the header in its metadata; a complex column is two."""
+    """Return Parquet, with the header in its metadata; a complex column becomes two columns."""
     pyarrow, parquet = parquet_modules()
     parts = [(name, unit, pyarrow.array(values)) for name, unit, values in real_columns(table)]
     fields = [pyarrow.field(name, values.type, metadata={"unit": unit}) for name, unit, values in parts]
@@ -610,12 +610,13 @@ def read_table(path: str | os.PathLike[str]) -> Table:
     Parameters
     ----------
     path
-        The file. Any CSV with commas, a head and decimal points is read; other formats only as they were written.
+        File of the table. Any CSV with commas, a head and decimal points is read; other formats only if `Table.write`
+        wrote the file.
 
     Raises
     ------
     TableError
-        If the file is missing, its ending is unknown, or it is damaged or holds no table.
+        If the file is missing, its ending is unknown, or it is damaged or contains no table.
     """
     source = Path(path)
     where = f"table {source}"

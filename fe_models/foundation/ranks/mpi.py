@@ -63,19 +63,19 @@ class MpiRanks:
 
     def abort(self, words: str) -> None:
         """Print the reason once, and end all ranks."""
-        # print here, because the next call ends this process before the command line can report the error
+        # print here, because the command line cannot report the error after the next call has ended this process
         sys.stderr.write(f"error: rank {self.rank} of {self.size}: {words}; all ranks end, no file is written\n")
         sys.stderr.flush()
         self.comm.Abort(FAILED)
         os._exit(FAILED)
 
     def _call(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> list[Any]:
-        """Call the function here. If only some ranks raise an error, the others are stuck, so all ranks are ended."""
+        """Call the function here. If only some ranks raise an error, the others would wait for ever: end all ranks."""
         answer: Any = None
         error: ReportedError | None = None
         try:
             answer = function(self, *arguments)
-        except ReportedError as told:  # the same error on all ranks: functions agree on the errors that they report
+        except ReportedError as told:  # all ranks raise it: functions agree on the errors that they report
             error = told
         except BaseException as fault:
             self.abort(f"{type(fault).__name__}: {fault}")

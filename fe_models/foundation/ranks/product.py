@@ -9,7 +9,7 @@ from fe_models.foundation.ranks.rows import Rows
 
 __all__ = ["Halo", "RowsProduct"]
 
-COLUMNS = 16  #: columns per pass over the matrix; the rows of x in use then stay in the cache
+COLUMNS = 16  #: columns per pass over the matrix, so that the rows of x remain in the cache
 
 
 class Halo:
@@ -32,7 +32,7 @@ class Halo:
 class RowsProduct:
     """The map x -> A x with A, x and A x distributed by rows.
 
-    (1) once, every rank tells the others which of their rows its matrix entries touch (the halo)
+    (1) once, every rank requests from the others the rows that its matrix entries need (the halo)
     (2) the columns of its part of A are renumbered: own rows of x first, then the halo, owner by owner
     (3) in a product, ranks exchange the halo rows and multiply their rows of A by [own x; halo]
     """

@@ -32,8 +32,8 @@ class Ranks(Protocol):
     def everywhere(self, function: Callable[..., Any], *arguments: Any) -> list[Any]:
         """Call function(ranks, *arguments) on all ranks at once, from rank 0; return their results in order.
 
-        The function must be at the top level of a module. An error that all ranks raise, or only rank 0, is raised
-        here. Any other error ends all ranks, because the remaining ranks would wait for ever.
+        The function must be defined at the top level of a module. An error that all ranks or only rank 0 raise is
+        raised here. Any other error ends all ranks, because the remaining ranks would wait for ever.
         """
 
     def serve(self) -> None:
@@ -71,7 +71,7 @@ def started_ranks() -> int:
 
 
 def require_agreement(ranks: Ranks, question: Sequence[str]) -> None:
-    """Raise `RankError`, on every rank, unless all have the same program, libraries and question.
+    """Raise `RankError` on every rank, unless all have the same program, libraries and input.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ numbers = count()
 
 @dataclass(frozen=True, eq=False)
 class RowLayout:
-    """Assignment of rows to ranks: position k, counted through all ranks in order, holds row order[k]."""
+    """Assignment of rows to ranks: row order[k] is at position k, where positions run through all ranks in order."""
 
     ranks: Ranks
     order: IntArray  #: row at each position, (n,)
@@ -49,7 +49,7 @@ class RowLayout:
         return asked(self.ranks, function, *arguments)
 
     def free_with(self, owner: object, key: str) -> None:
-        """Let all ranks drop the data of a key with the first request after the last reference to the owner is gone."""
+        """Drop the data of a key on all ranks, with the first request after the owner has been garbage-collected."""
         weakref.finalize(owner, self.ranks.unreferenced.append, key).atexit = False
 
 

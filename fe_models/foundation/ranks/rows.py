@@ -40,7 +40,7 @@ def even_rows(indptr: np.ndarray, size: int) -> Rows:
 
 
 def own_rows(ranks: Ranks, rows: Rows, x: Array | None) -> Array:
-    """Return this rank's rows of a tall array that rank 0 holds, (n_own, k), in Fortran order."""
+    """Return this rank's rows, (n_own, k), of a tall array on rank 0, in Fortran order."""
     k = 0 if x is None else x.shape[1]
     if ranks.size == 1:
         assert x is not None
@@ -75,7 +75,7 @@ def collected(ranks: Ranks, rows: Rows, own: Array) -> Array | None:
 def spread(
     ranks: Ranks, rows: Rows, arrays: tuple[np.ndarray, np.ndarray, np.ndarray] | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return indptr, indices (int32) and data of this rank's rows of a compressed matrix that rank 0 holds."""
+    """Return indptr, indices (int32) and data of this rank's rows of a compressed matrix on rank 0."""
     if arrays is not None:
         indptr, indices, data = arrays
         for other in range(1, ranks.size):

@@ -1,4 +1,4 @@
-"""Tall columns distributed by rows over all ranks: rank 0 holds its own rows, and a key for the others.
+"""Tall columns distributed by rows over all ranks: rank 0 stores its own rows, and a key for the rows of the others.
 
 They implement the protocol `fe_models.foundation.tall.columns.Columns`.
 
@@ -44,7 +44,7 @@ class SpreadColumns:
     ndim = 2
 
     def __init__(self, layout: RowLayout, part: Part, source: object = None) -> None:
-        """Refer to columns that all ranks keep; source: the owner of the columns, if these are a part of others."""
+        """Refer to columns that all ranks keep; source: the owner of the columns, if this is a view of its columns."""
         self.layout, self.part, self.source = layout, part, source
         self.shape = (layout.n, part.last - part.first)
         if source is None:
@@ -147,7 +147,7 @@ def spread_columns(layout: RowLayout, X: Any) -> SpreadColumns:
 
 
 def spread_beside(layout: RowLayout, *blocks: Any) -> SpreadColumns:
-    """Return columns side by side, distributed, (n, k); the blocks may lie on rank 0 or be distributed."""
+    """Return columns side by side, distributed, (n, k); the blocks may be on rank 0 or distributed."""
     return spread_parts(layout, sum(X.shape[1] for X in blocks), blocks)
 
 
@@ -223,7 +223,7 @@ def put_here(ranks: Ranks, key: str, first: int, X: Part) -> None:
 
 
 def given_here(ranks: Ranks, key: str, rows: Rows, first: int) -> None:
-    """Write this rank's rows of columns that rank 0 holds, starting at a column."""
+    """Write this rank's rows of columns that are on rank 0, starting at a column."""
     x = own_rows(ranks, rows, ranks.store.pop("columns", None))
     ranks.store[key][:, first : first + x.shape[1]] = x
 

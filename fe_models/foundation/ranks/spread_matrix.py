@@ -1,4 +1,4 @@
-"""A symmetric sparse matrix distributed by rows: rank 0 holds its own rows, and a key for the others.
+"""A symmetric sparse matrix distributed by rows: rank 0 stores its own rows, and a key for the rows of the others.
 
 The row order (`order`) places neighbours near each other, so that a rank needs few remote rows in a product. Rows of a
 principal block stay on their ranks, so factorisation and eigensolver use them without redistribution.
@@ -27,11 +27,11 @@ COLUMNS = 32  #: number of columns of a product at a time
 
 @dataclass(frozen=True, eq=False)
 class OwnRows:
-    """Compressed rows of a matrix that one rank holds, over all columns."""
+    """Compressed rows of a matrix that are on one rank, over all columns."""
 
-    indptr: np.ndarray  #: (n_own + 1,) int32
-    indices: np.ndarray  #: ascending in each row, (n_entries,) int32
-    data: Array  #: (n_entries,)
+    indptr: np.ndarray  #: start of each row, (n_own + 1,) int32
+    indices: np.ndarray  #: column of each entry, ascending in each row, (n_entries,) int32
+    data: Array  #: entries, (n_entries,)
 
 
 class SpreadMatrix:
@@ -51,11 +51,12 @@ class SpreadMatrix:
         Parameters
         ----------
         order
-            The dof of each row, in the order of distribution, (n,).
+            Dof of each row, in the order of distribution, (n,).
         rows
-            Which rows each rank holds.
+            Rows on each rank.
         function
-            Called on all ranks at once with the arguments. Returns `OwnRows`, with columns in the order of the rows.
+            Function that is called on all ranks at once with the arguments. It returns `OwnRows`, with columns in the
+            order of the rows.
         """
         self.layout = RowLayout(ranks, order, rows)
         self.ranks, self.order, self.rows, self.key = ranks, order, rows, new_key()
@@ -143,7 +144,7 @@ class SpreadBlock:
         self.rows = Rows(tuple(int(before[start]) for start in matrix.rows.starts))  #: rows of the block on each rank
 
     def keep(self, key: str, *, upper: bool = False) -> int:
-        """Let every rank keep its `OwnRows` under a key, with all columns or the upper triangle; return how many."""
+        """Let every rank keep its `OwnRows` under a key (all columns, or upper triangle); return the entry count."""
         return sum(self.matrix._ask(block_here, key, self.matrix.key, self.is_chosen, self.rows, upper))
 
     def expanded(self, x: SpreadColumns) -> SpreadColumns:
@@ -194,7 +195,7 @@ def diagonal_here(ranks: Ranks, key: str) -> Array:
 
 
 def multiplied_here(ranks: Ranks, key: str, rows: Rows) -> Array | None:
-    """Return A x on rank 0 for columns that rank 0 holds."""
+    """Return A x on rank 0 for columns on rank 0."""
     x = own_rows(ranks, rows, ranks.store.pop("columns", None))
     return collected(ranks, rows, ranks.store[key] @ x)
 

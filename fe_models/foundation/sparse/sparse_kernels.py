@@ -57,7 +57,7 @@ def column_entries(indptr, indices, data, index, new_row, part, n_parts, new_ind
 def n_scalar_nodes(indptr, indices, data):
     """Return the largest p for which the first 3 p rows and columns of a symmetric matrix are exactly S ⊗ 1₃.
 
-    Entries outside the diagonal block of a node are compared with the node they couple to; the matrix is symmetric.
+    The columns of a node are compared only in its own rows and those of earlier nodes, because the matrix is symmetric.
     """
     n_nodes = (indptr.size - 1) // 3
     for node in range(n_nodes):

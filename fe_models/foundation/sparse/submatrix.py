@@ -19,7 +19,7 @@ SMALL = 200_000  #: number of stored entries below which compiled loops cost mor
 
 @dataclass(frozen=True, eq=False)
 class PrincipalBlock:
-    """The submatrix A[index][:, index], (n, n); gives products and the diagonal without forming the submatrix."""
+    """The submatrix A[index][:, index], (n, n); provides products and the diagonal without computing the submatrix."""
 
     A: sp.csc_array
     index: IntArray  #: rows and columns in any order, each once, (n,)
@@ -38,7 +38,7 @@ class PrincipalBlock:
         return np.asarray((self.A @ self.expanded(x))[self.index])
 
     def expanded(self, x: Any) -> Any:
-        """Return one column (n,) or many (n, k) over all rows of A, zero outside the submatrix.
+        """Extend one column (n,) or many (n, k) to all rows of A, with zeros outside the submatrix.
 
         Columns that are distributed like the submatrix stay distributed.
         """
@@ -88,8 +88,8 @@ def scalar_part(A: sp.csc_array) -> sp.csr_array:
     Parameters
     ----------
     A
-        Symmetric, (n, n), dofs node by node. p is 0 if the first three dofs do not form such a block, or if the row
-        indices are not sorted.
+        Symmetric matrix, (n, n), dofs node by node. p is 0 if the first three dofs do not form such a block, or if the
+        row indices are not sorted.
     """
     from fe_models.foundation.sparse.sparse_kernels import n_scalar_nodes, scalar_entries
 
@@ -101,7 +101,7 @@ def scalar_part(A: sp.csc_array) -> sp.csr_array:
     return sp.csr_array((data, indices, indptr), shape=(p, p))
 
 
-# an ordering of dofs that places neighbours near each other, whatever the order of the nodes in the file --------------
+# an ordering of dofs that places neighbours near each other, for any order of the nodes in the file -------------------
 # A product with a sparse matrix reads the vector in the order of the numbering. Mesh programs number nodes corner by
 # corner, then edge by edge, so neighbours lie tens of thousands of rows apart and every read misses the cache. In
 # reverse Cuthill-McKee order they lie within a band.
@@ -121,11 +121,11 @@ def nearby_order(A: sp.csc_array, dofs: IntArray, index: IntArray) -> IntArray:
     Parameters
     ----------
     A
-        Symmetric, over all dofs, (n_dof, n_dof).
+        Symmetric matrix over all dofs, (n_dof, n_dof).
     dofs
         (node, component) of all dofs, (n_dof, 2).
     index
-        The dofs to order, ascending, (n,).
+        Dofs to order, ascending, (n,).
     """
     if isinstance(A, SpreadMatrix):
         return A.ordered(index)

@@ -1,1 +1,1 @@
-"""Tall arrays (with many rows) that lie on disk and are processed in slices of rows."""
+"""Tall arrays (with many rows) that are stored on disk and processed in slices of rows."""

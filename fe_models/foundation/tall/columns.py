@@ -5,8 +5,8 @@ threads. NumPy's own BLAS threads poll for their next task and thereby block pro
 threads sleep. Slices are summed in order, so results are bitwise reproducible.
 
 Columns of every other kind implement `Columns`, such as those that are distributed over ranks (`SpreadColumns`). The
-same functions then run where the rows are: arrays used together with such columns are sent there, and results stay
-there. Callers therefore do not ask where columns lie.
+same functions then run in the processes that store the rows: arrays used together with such columns are sent there, and
+results stay there. Callers therefore need not know where columns are stored.
 """
 
 from collections.abc import Callable, Iterator
@@ -51,7 +51,7 @@ class Columns(Protocol):
     def __truediv__(self, factors: Any) -> Any: ...
 
     def on_rows(self, function: Callable[..., Any], *arguments: Any) -> list[Any]:
-        """Call function(*arguments) for each part of the rows, with these rows of all columns among the arguments."""
+        """Call function(*arguments) for each part of the rows; `Columns` among the arguments become these rows."""
 
     def made(self, k: int, function: Callable[..., Array], *arguments: Any) -> "Columns":
         """Return the columns, (n, k), whose rows function(*arguments) returns for each part; see `on_rows`."""
@@ -85,7 +85,7 @@ def inner(X: Any, Y: Any) -> Array:
 
 
 def gram(X: Any, AX: Any) -> Array:
-    """Return Xᵀ A X for symmetric A, averaging the rounding errors of its two halves."""
+    """Return Xᵀ A X for symmetric A, as the mean of the computed product and its transpose."""
     G = inner(X, AX)
     return (G + G.T) / 2
 
@@ -166,8 +166,8 @@ def subtract(Y: Any, X: Any, C: Array) -> None:
 def beside(*blocks: Any) -> Any:
     """Return a copy of blocks of columns with equally many rows, side by side.
 
-    The result is on disk if one block is on disk and the result is large; it is where other `Columns` are, if one of
-    the blocks is.
+    The result is on disk if one block is on disk and the result is large. If a block is of another kind of `Columns`,
+    so is the result.
     """
     if (far := elsewhere(*blocks)) is not None:
         return far.beside(*blocks)

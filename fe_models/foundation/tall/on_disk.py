@@ -63,7 +63,7 @@ def mapped(X: Any) -> mmap.mmap | None:
 
 
 def is_on_disk(X: Any) -> bool:
-    """Return whether an array lies on disk."""
+    """Return whether an array is stored on disk."""
     return mapped(X) is not None
 
 
@@ -81,14 +81,14 @@ def zeros_like(X: Any, shape: tuple[int, ...]) -> Array:
 
 
 def row_slices(rows: slice | int, *arrays: Array, height: int | None = None) -> Iterator[slice]:
-    """Yield slices of rows and release the memory after each; without an array on disk, slices of that height.
+    """Yield slices of rows and release the memory after each; without an array on disk, slices of the given height.
 
     Parameters
     ----------
     rows
         The rows as a slice, or the number of rows.
     arrays
-        Arrays with at least that many rows.
+        Arrays with at least so many rows.
     height
         Number of rows of a slice if no array is on disk; None: a single slice.
     """

@@ -1,7 +1,7 @@
 """A campaign: one task at many values, computed by workers; failures are rows, and a later call continues.
 
-A journal gets a line for every row as soon as it is known. Its first line holds the kind of the journal and the digest
-of all inputs that affect the results. A line that an interruption cut off counts as not written.
+A line for every row is appended to a journal as soon as the row is known. The first line contains the kind of the
+journal and the digest of all inputs that affect the results. A line truncated by an interruption is ignored.
 """
 
 import hashlib
@@ -26,7 +26,7 @@ Made = TypeVar("Made")
 
 
 class CampaignTask(Protocol[Given, Made]):
-    """What is computed at a value, and how its row stands in a journal; it is sent to workers."""
+    """Computation of a row at a value, and its form in a journal; the task is sent to workers."""
 
     def __call__(self, value: Given, /) -> Made:
         """Return the row of a value."""
@@ -50,9 +50,9 @@ class Campaign(Generic[Value, Row]):
     Parameters
     ----------
     task
-        Computes a row.
+        Task that computes a row.
     journal
-        Keeps the rows; None: nothing is written.
+        Journal that stores the rows; None: nothing is written.
     """
 
     def __init__(self, task: CampaignTask[Value, Row], journal: "TaskJournal | None" = None) -> None:
@@ -77,11 +77,11 @@ class Campaign(Generic[Value, Row]):
         Parameters
         ----------
         values
-            The values.
+            Values of all rows.
         workers, threads
             As in `tasks_of`.
         progress
-            Called with the number of known rows and that of all.
+            Callback that receives the number of known rows and of all rows.
         files
             As in `TaskMap.map`.
         """

@@ -2,8 +2,8 @@
 
 (1) before any work, every worker must report the same installation as this process
 (2) every task repeats this check, because workers may join later, and checks that it sees the files it needs
-(3) a task whose worker ends is given to another worker, first by the scheduler as its settings say, then from here; the
-    last attempt runs alone, so that it cannot affect other tasks
+(3) a task whose worker ends is given to another worker, first by the scheduler according to its settings, then by this
+    process; the last attempt runs alone, so that it cannot affect other tasks
 """
 
 import logging
@@ -116,7 +116,7 @@ def dask_at(host: str, port: int) -> "DaskTasks":
 def listen(host: str, port: int) -> None:
     """Raise `OSError` unless a scheduler listens at the address; it sends the length of a message in 8 bytes first.
 
-    The client of Dask waits for ever if a program accepts the connection and sends nothing.
+    Without this check, Dask's client would wait for ever if a program accepts the connection and sends nothing.
     """
     with socket.create_connection((host, port), timeout=CONNECT) as connection:
         heard = b""
@@ -319,7 +319,7 @@ def lost(error: Exception) -> str:
     )
 
 
-#: one value at a time, because threads of a worker share the threads and caches of libraries
+#: lock for one value at a time, because threads of a worker share the threads and caches of libraries
 one_at_a_time = threading.Lock()
 for_good = ExitStack()  #: contexts of a worker that are never closed
 

@@ -15,14 +15,14 @@ def heeded_interrupts() -> Iterator[Callable[[], None]]:
     """Record every Ctrl-C (SIGINT) within this context, in addition to raising it.
 
     Python raises `KeyboardInterrupt` between any two of its instructions. If these belong to the callback of a weak
-    reference or to a `__del__`, the exception is printed and lost, and the work goes on. In such places it is not
-    raised here. Work in a long loop must call the yielded function in every iteration.
+    reference or to a `__del__`, the exception is printed and lost, and the work continues. In these places it is
+    recorded but not raised. Long loops must therefore call the yielded function in every iteration.
 
     Yields
     ------
     Callable
-        Raises `KeyboardInterrupt` if a Ctrl-C was recorded. It never raises outside the main thread, or if the program
-        has its own handler; Python and that handler decide then.
+        Function that raises `KeyboardInterrupt` if a Ctrl-C was recorded. It does nothing outside the main thread, or
+        if the program has its own handler of SIGINT.
     """
     has_come = False
 

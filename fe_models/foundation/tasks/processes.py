@@ -1,7 +1,7 @@
 """Evaluation of a function at many values in local processes; a process that ends does not affect the others.
 
 If a worker is killed, another worker takes its value. A value whose workers all ended, or whose answer cannot be sent,
-is an error of that value alone. Workers end with this process, however it ends (also by SIGTERM, SIGHUP or SIGKILL).
+is an error of this value alone. Workers end with this process, for any cause (also SIGTERM, SIGHUP or SIGKILL).
 """
 
 import os
@@ -186,7 +186,7 @@ class WorkerPool:
 def give(
     worker: Worker, code: bytes, values: Sequence[Any], waiting: "deque[int]", errors: dict[int, Exception]
 ) -> None:
-    """Send the next value, if there is one, to a worker, and before it the function if the worker has another one."""
+    """Send the next value to a worker, if there is one; first send the function, unless the worker already has it."""
     worker.number = None
     if not waiting:
         return

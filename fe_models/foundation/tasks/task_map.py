@@ -1,4 +1,4 @@
-"""Protocol of a task map: function(value) for many values, wherever it is computed.
+"""Protocol of a task map: function(value) for many values, computed in this process, other processes or a cluster.
 
 `tasks_of` in `fe_models.foundation.tasks.workers` makes one from the user's choice: a number, dask, dask://host:port.
 """
@@ -45,12 +45,12 @@ class TaskMap(Protocol):
         values
             Arguments of the calls.
         failed
-            Returns the replacement for a value whose call failed; None: the first error, in order of the values, is
-            raised.
+            Function that returns a replacement for a value whose call failed; None: the first error, in order of the
+            values, is raised.
         progress
-            Called with the number of finished values and the number of all values.
+            Callback that receives the number of finished values and of all values.
         done
-            Called with the index of a value and its result as soon as it is known, in any order.
+            Callback that receives the index of a value and its result as soon as it is known, in any order.
         files
             Absolute paths of the files that the function reads or writes; every worker must see them.
 
