@@ -132,6 +132,8 @@ def test_the_system_of_the_readme_moves_its_body(tmp_path, reduced):
     cms.write(reduced, tmp_path / "rod.h5")
     (tmp_path / "swing.toml").write_text(re.search(r"```toml\n(\[system\].*?)```", README.read_text(), re.DOTALL)[1])
     system, run = ff.read_system(tmp_path / "swing.toml")
-    motion = ff.integrate(system, run.integrator, 20 * run.h, run.h)
-    assert_allclose(motion.energies.balance, 0, rtol=0, atol=1e-6)
-    assert motion.body("rod").interface("small_end").position[-1, 2] < 0
+    motion = ff.integrate(system, run.integrator, 0.25, run.h, output_every=run.output_every)
+    assert_allclose(motion.energies.balance / np.ptp(motion.energies.kinetic), 0, rtol=0, atol=1e-6)
+    tips = [each.body("rod").interface("small_end").position[-1] for each in (motion, swing(reduced, 0.25))]
+    assert_allclose(*tips, rtol=0, atol=1e-3)
+    assert tips[0][2] < -100.0
