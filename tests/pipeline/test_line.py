@@ -133,7 +133,7 @@ def test_the_system_of_the_readme_moves_its_body(tmp_path, reduced):
     (tmp_path / "swing.toml").write_text(re.search(r"```toml\n(\[system\].*?)```", README.read_text(), re.DOTALL)[1])
     system, run = ff.read_system(tmp_path / "swing.toml")
     motion = ff.integrate(system, run.integrator, 0.25, run.h, output_every=run.output_every)
-    assert_allclose(motion.energies.balance / np.ptp(motion.energies.kinetic), 0, rtol=0, atol=1e-6)
+    assert np.ptp(motion.energies.balance) < 1e-6 * np.ptp(motion.energies.kinetic)
     tips = [each.body("rod").interface("small_end").position[-1] for each in (motion, swing(reduced, 0.25))]
     assert_allclose(*tips, rtol=0, atol=1e-3)
     assert tips[0][2] < -100.0
