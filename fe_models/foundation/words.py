@@ -32,7 +32,7 @@ def shortened(text: str, longest: int = LONGEST) -> str:
 
 
 def node_list(nodes: Iterable[int], positions: NDArray[np.float64], called: Callable[[int], str] = str) -> str:
-    """Return 'node 3 at (0, 1, 2.5), node 7 at (…)' for a message; called: gives the user's name of a node."""
+    """Return 'node 3 at (0, 1, 2.5), node 7 at (…)' for a message; `called` returns the user's name of a node."""
     return ", ".join(f"node {called(n)} at ({', '.join(f'{x:.6g}' for x in positions[n])})" for n in nodes)
 
 
@@ -46,7 +46,7 @@ def quoted(value: object) -> str:
 
 
 def damage(error: BaseException) -> str:
-    """Return the end of a message about a file that its reader could not read: the probable cause, and its error."""
+    """Return the end of a message about a file that could not be read: the probable cause, and the reader's error."""
     lines = str(error).strip().splitlines()
     said = f": {lines[0][:200]}" if lines else ""
     return f"it is damaged or of another kind ({type(error).__name__}{said})"

@@ -153,8 +153,8 @@ def boundary_triangles(mesh: Mesh) -> IntArray:
 def facet_weights(nodes: Array, faces: Mapping[str, IntArray]) -> Array:
     """Return the area of each node, (n_nodes,) [m²]: the integral of its shape function over the faces.
 
-    The sum is the area of the faces. Corners of flat quadratic triangles get exactly zero. Corners of eight-node quads
-    would get a negative share (-1/12 of the face). These faces are distributed with the diagonal of their mass matrix
+    The sum is the area of the faces. Corners of flat quadratic triangles have exactly zero. Corners of eight-node quads
+    would have a negative share (-1/12 of the face). For these faces the shares are the diagonal of the mass matrix
     instead (∫N_i² scaled to the area), which is positive and keeps the area of each face.
 
     Parameters

@@ -24,7 +24,7 @@ class CellShape:
     name: str  #: meshio name of the cell type
     dim: int  #: dimension: 3 for a solid, 2 for a face
     corners: tuple[tuple[float, ...], ...]  #: reference coordinates of the corner nodes
-    middles: tuple[tuple[int, ...], ...]  #: for each further node, the corners whose mean it is
+    middles: tuple[tuple[int, ...], ...]  #: for each further node, the corners whose mean gives its position
     facets: tuple[tuple[int, ...], ...]  #: corner nodes of each facet, anticlockwise from outside
     #: exponents of the monomials of the shape functions; for pyramids in x, y, 1 - z
     exponents: tuple[tuple[int, ...], ...]
@@ -138,7 +138,7 @@ def shape_values(kind: str, points: Array) -> tuple[Array, Array]:
     Returns
     -------
     N, dN
-        (n_points, n_nodes) and (n_points, n_nodes, dim).
+        Shape functions, (n_points, n_nodes), and their gradients, (n_points, n_nodes, dim).
     """
     shape = CELL_SHAPES[kind]
     exponents = np.array(shape.exponents)
@@ -226,7 +226,7 @@ def cell_jacobians(kind: str, coordinates: Array, points: Array) -> Array:
     Returns
     -------
     Array
-        (n_cells, n_points) [m³].
+        Determinants, (n_cells, n_points) [m³].
     """
     dN = shape_values(kind, points)[1]
     n_points, n_nodes, _ = dN.shape

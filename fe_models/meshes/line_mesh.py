@@ -130,14 +130,14 @@ def straight_line(start: object, end: object, n: int, *, name: str = "beam") -> 
 def divide_lines(mesh: LineMesh, n: ArrayLike) -> LineMesh:
     """Return the mesh with each line divided into equal pieces.
 
-    The new nodes come after the old ones, line by line from the first end. Their numbers in the file continue from the
-    highest number. Groups of lines keep all pieces. A group of nodes with the same name that held all line ends also
-    receives the new nodes. Orientations stay, and offsets of the axis are interpolated linearly.
+    The new nodes come after the old ones, line by line from the first end. They have no numbers in the file. Groups of
+    lines contain all pieces. A group of nodes with the same name that contained all line ends also receives the new
+    nodes. Orientations do not change, and offsets of the axis are interpolated linearly.
 
     Parameters
     ----------
     mesh
-        Any mesh of lines.
+        Mesh of lines.
     n
         Number of pieces of each line, 1 or more: one number for all lines, or (n_lines,).
 

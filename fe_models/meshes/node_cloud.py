@@ -1,4 +1,4 @@
-"""Nodes of a model whose elements stay in another program: positions, numbers, and groups for selection."""
+"""Nodes of a model whose elements are only in another program: positions, numbers, and groups for selection."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,7 @@
 """The user's numbers and names of nodes, elements and sets, as in the deck or mesh of the body.
 
-Internally, a node is its row in an array of nodes, and an element is the set of surface triangles that it made. This
-record holds the user's names. It stays with the body through coupling, joining and reduction, and goes into the modal
+Internally, a node is a row of an array of nodes, and an element is the set of its surface triangles. This record
+contains the user's names. It stays with the body through coupling, joining and reduction, and is written to the modal
 file. Messages, sensors, tables and exported files take names only from here.
 """
 
@@ -154,9 +154,9 @@ class Numbering:
         Parameters
         ----------
         where
-            Start of the error message: the place where the user named the node.
+            Start of the error message: where the user named the node.
         node
-            The number, or "INSTANCE.number" if several instances have it.
+            Number of the node, or "INSTANCE.number" if several instances have this number.
 
         Raises
         ------

@@ -10,7 +10,7 @@ from fe_models.meshes.mesh import Mesh
 __all__ = ["FIRST_ORDER", "quadratic_mesh", "tetrahedra_of"]
 
 FIRST_ORDER = ("tetra", "hexahedron", "wedge", "pyramid")  #: solid cell types with corner nodes only
-#: raised cell type, whose field contains that of the first-order cell
+#: second-order cell type for each first-order type; its field contains the field of the first-order cell
 RAISED = {"tetra": "tetra10", "hexahedron": "hexahedron27"}
 
 

@@ -261,7 +261,7 @@ class Box:
     hi: Vector
 
     def members(self, mesh: AnyMesh) -> IntArray:
-        """Return the surface nodes inside the box, ascending; its walls are moved outward by 1e-9 of the body size."""
+        """Return the surface nodes inside the box, ascending; the box is enlarged by 1e-9 of the body size."""
         lo, hi = _point("box", self.lo), _point("box", self.hi)
         if (lo > hi).any():
             raise InterfaceError(f"box: expected lo <= hi, got {_text(self.lo)} and {_text(self.hi)}")

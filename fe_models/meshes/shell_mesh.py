@@ -131,7 +131,7 @@ def mapped_shell(
     Parameters
     ----------
     surface
-        Maps (u, v), (n,) each in 0..1, to X, (n, 3) [m].
+        Function from u and v, (n,) each in 0..1, to X, (n, 3) [m].
     n_u, n_v
         Numbers of cells along u and v.
     name

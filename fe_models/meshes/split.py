@@ -276,7 +276,7 @@ def cells_kept(mesh: Mesh, kept: Mapping[str, Array], source: str) -> Mesh:
         part,
         face_sets={group: by_type for group, by_type in part.face_sets.items() if by_type},
         node_sets=without_empty(part.node_sets),
-        notes=mesh.notes,  # nodes of other parts are not worth a note
+        notes=mesh.notes,  # no note about dropped nodes: they are in other parts
         source=source,
     )
 

@@ -23,7 +23,7 @@ def line_mesh_from_raw(raw: RawMesh, path: Path, digest: str, groups: tuple[str,
     path, digest
         Name of the file and its sha256, for the record and the messages.
     groups
-        Only lines of these groups; None: all.
+        Groups whose lines are kept; None: all lines.
 
     Raises
     ------

@@ -53,7 +53,7 @@ class RawMesh:
     notes: tuple[str, ...] = ()
     #: instances in a deck with repeated numbers; numbers of the k-th are increased by k `instance_step`
     instances: tuple[str, ...] = ()
-    instance_step: int = 0  #: step between numbers of instances; 0: numbers are those of the deck
+    instance_step: int = 0  #: step between numbers of instances; 0: numbers are unchanged
     included: Mapping[str, str] = field(default_factory=dict)  #: sha256 of each file that the file includes
 
 
@@ -71,7 +71,7 @@ def mesh_from_raw(raw: RawMesh, path: Path, digest: str) -> Mesh:
     ------
     MeshError
         If there are no nodes or solid cells, a coordinate is not finite, a cell type is not supported, cells name
-        nodes that do not exist, cells are listed twice, or middle nodes are not where their type has them.
+        nodes that do not exist, cells are listed twice, or middle nodes are in the wrong order for their cell type.
     """
     where = f"mesh {path}"
     nodes, blocks = require_nodes(where, raw)
@@ -117,9 +117,9 @@ def chosen_cells(raw: RawMesh, kinds: tuple[str, ...], groups: tuple[str, ...] |
     Parameters
     ----------
     kinds
-        That are kept; of other kinds, faces stay where `kinds` are solid.
+        Cell types to keep; if these are solids, faces are kept too.
     groups
-        Whose cells are kept; None: all of these kinds.
+        Groups whose cells are kept; None: all cells of these types.
     """
     selecting = FACE_TYPES if set(kinds) <= set(SOLID_TYPES) else ()
     blocks = []
@@ -237,7 +237,7 @@ def _without_repeats(
     return kept, place
 
 
-# whether the nodes of the cells stand where their type has them, and the order of mirrored cells ----------------------
+# check of the positions of nodes within their cells, and the node order of mirrored cells -----------------------------
 
 
 _REFLECTED_CORNERS = {
@@ -255,10 +255,10 @@ _CHUNK = 20_000  #: number of cells that are checked at a time, so that a millio
 
 
 def require_node_order(where: str, kind: str, nodes: Array, cells: IntArray) -> None:
-    """Raise `MeshError` if the middle nodes of most cells stand nearest to the middle of another edge or face.
+    """Raise `MeshError` if the middle nodes of most cells are nearest to the middle of another edge or face.
 
-    A wrong order is systematic: the same place is wrong in (nearly) all cells. Single cells whose middle node was
-    dragged across a thin edge are left to the mesh report.
+    A wrong order is systematic: the same position is wrong in (nearly) all cells. Single cells whose middle node was
+    moved across a thin edge are reported by the mesh report instead.
     """
     middles = CELL_SHAPES[kind].middles
     if not middles:
@@ -330,8 +330,8 @@ def _is_mirrored(kind: str, nodes: Array, cells: IntArray) -> np.ndarray:
 def groups_apart(raw: RawMesh, kinds: Iterable[str], groups: Iterable[str]) -> list[tuple[str, ...]]:
     """Split groups, in their order, into parts without two cells on the same nodes; one part if none is doubled.
 
-    Each group goes to the first part that it fits. Cells of one group on the same nodes stay together: they are a
-    fault, or one cell that is listed twice.
+    Each group goes to the first part in which none of its cells is doubled. Cells of one group on the same nodes stay
+    together: they are a fault, or one cell that is listed twice.
 
     Parameters
     ----------
@@ -375,7 +375,7 @@ def _doubled(raw: RawMesh, kinds: tuple[str, ...]) -> list[IntArray]:
 
 
 def _of_group(raw: RawMesh, kinds: tuple[str, ...], group: str, doubled: list[IntArray]) -> dict[int, int]:
-    """Return place -> number of the cell, counted through all blocks, of the doubled cells of a group."""
+    """Return number of the node set -> index of the cell over all blocks, for the doubled cells of a group."""
     found: dict[int, int] = {}
     first = 0
     for block, places in zip(raw.blocks, doubled, strict=True):

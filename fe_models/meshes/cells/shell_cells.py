@@ -37,7 +37,7 @@ def shell_mesh_from_raw(
     path, digest
         Name of the file and its sha256, for the record and the messages.
     groups
-        Only cells of these groups; None: all.
+        Groups whose cells are kept; None: all cells.
     stiffeners
         Groups of lines that are stiffeners; other lines only select nodes.
 
@@ -107,7 +107,7 @@ def shell_mesh_from_raw(
 def with_centres(raw: RawMesh) -> RawMesh:
     """Return a mesh in which quads with eight nodes get a ninth node at the middle of the quadratic field.
 
-    The new nodes come last, with the number -1: the file does not number them.
+    The new nodes come last, with the number -1, because the file has no numbers for them.
     """
     nodes, numbers = [raw.nodes], [raw.node_numbers]
     blocks, n = [], len(raw.nodes)

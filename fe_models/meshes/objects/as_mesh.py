@@ -28,7 +28,7 @@ from fe_models.meshes.shell_mesh import ShellMesh
 __all__ = ["as_line_mesh", "as_mesh", "as_shell_mesh", "raw_from_pyvista", "selectable"]
 
 
-# what a `pyvista.UnstructuredGrid` says: its cells, and whole-number data as groups -----------------------------------
+# content of a `pyvista.UnstructuredGrid`: its cells, and whole-number data as groups ----------------------------------
 
 
 VTK_TYPES = {
@@ -42,7 +42,7 @@ VTK_TYPES = {
 def raw_from_pyvista(grid: Any) -> RawMesh:
     """Return nodes, cells and groups of an unstructured grid.
 
-    Every value of whole-number cell data is a group `<array>_<value>`; point data that hold only 0 and 1 are node sets.
+    Every value of whole-number cell data is a group `<array>_<value>`; point data with only 0 and 1 are node sets.
     Arrays of VTK itself (`vtkOriginalCellIds`, `vtkGhostType`) are left out.
     """
     nodes = np.asarray(grid.points, dtype=float)

@@ -18,9 +18,9 @@ def raw_from_meshio(mesh: Any) -> RawMesh:
     """Return nodes, cells and groups of a `meshio.Mesh`.
 
     Cell sets keep their names; every value of whole-number cell data is a group `<array>_<value>`. Point sets, and
-    whole-number point data that hold only 0 and 1, become node sets. Point data "node" and cell data "element" (or of
-    VTK, "GlobalNodeId" and "GlobalElementId") with a different whole number each are the numbers of nodes and cells.
-    Linear wedges are taken inside out where they do not follow VTK's own definition of their orientation.
+    whole-number point data with only 0 and 1, become node sets. Point data "node" and cell data "element" (in VTK
+    "GlobalNodeId" and "GlobalElementId") are the numbers of nodes and cells, if these are distinct whole numbers.
+    Linear wedges that do not follow VTK's own definition of their orientation are reversed.
     """
     nodes = np.asarray(mesh.points, dtype=float)
     cell_numbers = numbers_of_cells(mesh)

@@ -26,18 +26,18 @@ class BasisNodes:
 
 
 def nodes_of_basis(basis: Any) -> BasisNodes:
-    """Return the nodes of a basis, which its shape functions determine, whatever the name of the element.
+    """Return the nodes of a basis, which its shape functions determine, for any name of the element.
 
     (1) each shape function must have one component that is not zero, the same in all cells;
-    (2) functions of equal values belong to one node, three to each;
-    (3) Σ phi_s = 1 and Σ phi_s x_s = x at every point of quadrature, x_s the places of the dofs: so that a rigid motion
-        has the values of its displacement at the nodes as coefficients, as `FEBody` takes it to be.
+    (2) the three functions with equal values belong to one node;
+    (3) Σ phi_s = 1 and Σ phi_s x_s = x at every quadrature point, with the positions x_s of the dofs; the coefficients
+        of a rigid motion are then its displacements at the nodes, as `FEBody` assumes.
 
     Raises
     ------
     MeshError
-        If the basis is not of three dimensions and components, or one of these does not hold (bubbles, edge elements,
-        Hermite elements).
+        If the basis does not have three dimensions and components, or a condition (1) to (3) does not hold (bubbles,
+        edge elements, Hermite elements).
     """
     where = f"scikit-fem basis of {type(basis.elem).__name__}"
     advice = "expected ElementVector of an element whose dofs are values at points, such as ElementTetP2()"
@@ -101,7 +101,7 @@ def raw_from_basis(basis: Any) -> RawMesh:
     Raises
     ------
     MeshError
-        As `nodes_of_basis`, and if the element has nodes that no cell type here has.
+        As for `nodes_of_basis`, and if no cell type here has the nodes of the element.
     """
     found = nodes_of_basis(basis)
     element = type(getattr(basis.elem, "elem", basis.elem)).__name__

@@ -18,12 +18,12 @@ FLAT_KINDS = {"ElementTriP1": "triangle", "ElementQuad1": "quad"}
 def raw_from_skfem(mesh: Any) -> RawMesh:
     """Return nodes, cells and groups of a mesh of scikit-fem.
 
-    Subdomains are groups of cells, boundaries groups of faces; a mesh in the plane lies at z = 0.
+    Subdomains become groups of cells, boundaries become groups of faces; a plane mesh is placed at z = 0.
 
     Raises
     ------
     MeshError
-        If its cells are of a kind that has no element here.
+        If there is no element for its cell type.
     """
     name = mesh.elem.__name__
     if name not in SOLID_KINDS | FLAT_KINDS:
@@ -44,11 +44,11 @@ def raw_from_cells(mesh: Any, element: str, nodes: Array, cells: IntArray, of_ve
     Parameters
     ----------
     mesh
-        With subdomains and boundaries.
+        Mesh with subdomains and boundaries.
     element
         Name of the scalar element of scikit-fem whose nodes the cells have.
     nodes
-        (n_nodes, 3).
+        Node positions, (n_nodes, 3).
     cells
         Nodes of each cell in the order of the element, (n_cells, n).
     of_vertex
@@ -58,7 +58,7 @@ def raw_from_cells(mesh: Any, element: str, nodes: Array, cells: IntArray, of_ve
         kind = FLAT_KINDS[element]
     else:
         kind = SOLID_KINDS[element]
-        cells = turned_upright(kind, nodes, cells[:, skfem_node_order(kind)])  # scikit-fem takes |det J|
+        cells = turned_upright(kind, nodes, cells[:, skfem_node_order(kind)])  # scikit-fem allows any sign of det J
     subdomains = {name: np.asarray(rows, dtype=np.int64) for name, rows in (mesh.subdomains or {}).items()}
     blocks = [RawBlock(kind, cells, {name: rows for name, rows in subdomains.items() if len(rows)})]
     node_sets: dict[str, IntArray] = {}
@@ -86,7 +86,7 @@ def _faces(nodes: Array, facets: IntArray) -> dict[str, IntArray]:
     quads = facets[~is_triangle]
     if len(quads):
         turns = np.array([[0, 1, 2, 3], [0, 1, 3, 2], [0, 2, 1, 3]])
-        X = nodes[quads[:, turns]]  # of the three ways around four corners the right one has the largest area
+        X = nodes[quads[:, turns]]  # of the three cyclic orders of four corners, the correct one has the largest area
         area = np.linalg.norm(np.cross(X[:, :, 2] - X[:, :, 0], X[:, :, 3] - X[:, :, 1]), axis=2)
         found["quad"] = np.take_along_axis(quads, turns[area.argmax(axis=1)], axis=1)
     return found
