@@ -153,6 +153,7 @@ def test_stress_and_surface_come_back_from_mbsim(mean, tmp_path):
     flip = np.sign(np.einsum("ak,ak->k", body.interface("left").Psi[:3], mean.interface("left").Psi[:3]))
     n = len(mean.nodes)
     assert_allclose(body.stress[:n] * flip, mean.stress, rtol=0, atol=1e-8 * np.abs(mean.stress).max())
+    assert_allclose(body.Phi[: 3 * n] * flip, mean.Phi, rtol=0, atol=1e-8 * np.abs(mean.Phi).max())
     assert np.array_equal(body.surface, mean.surface)
 
 
