@@ -56,13 +56,13 @@ class AccelerationDerivatives(NamedTuple):
 class RelativeModel:
     """Equations of a tree of rigid and flexible bodies by recursion, M(z) z_ddot + h(z, z_dot) = forces.
 
-    Positions z, (n_z,), rates z_dot, accelerations and forces, (n_rates,), stand body by body in the order of the
-    system: those of the joint that carries the body, in the order of its coordinates, then its modal coordinates.
-    Zero is the joint as placed for angles, points that coincide for distances. A spherical joint has four positions,
-    the Euler parameters (w, x, y, z) of the axes of marker B in those of marker A, and three rates, the angular
-    velocity of B as seen from A in axes of B; a free body the position of its frame origin and the Euler parameters of
-    R_GB, with its velocity in ground axes and its angular velocity in body axes. A derivative by z is one along the
-    rates: rotations turn by R exp(dz). `names` and `rate_names` say what each number is.
+    Positions z, (n_z,), rates z_dot, accelerations and forces, (n_rates,), are ordered by bodies, in the order of the
+    system: first those of the joint that carries the body, in the order of its coordinates, then its modal coordinates.
+    An angle is zero for the joint as placed, a distance if the points coincide. A spherical joint has four positions,
+    the Euler parameters (w, x, y, z) of the axes of marker B relative to marker A, and three rates, the angular
+    velocity of B relative to A in axes of B. A free body has the position of its frame origin and the Euler parameters
+    of R_GB, with its velocity in ground axes and its angular velocity in body axes. Derivatives by z are taken along
+    the rates: rotations change by R exp(dz). `names` and `rate_names` name each number.
 
     The working arrays belong to the model: two threads need two.
 
@@ -128,9 +128,9 @@ class RelativeModel:
     ) -> Array:
         """Return the forces along all coordinates for a given motion, (n_rates,) [N, N m; modes: N m^(1/2)].
 
-        Recursive Newton-Euler, in a time that grows with the number of bodies: Walker & Orin (1982), for bodies in
-        floating frames docs/recursive.md §2. Joints are taken to be driven, modes to be held by their own stiffness and
-        damping: their entries vanish in a motion without modal loads.
+        The recursive Newton-Euler method takes a time proportional to the number of bodies: Walker & Orin (1982); for
+        bodies in floating frames see docs/recursive.md §2. All joints count as driven. Modes have their own stiffness
+        and damping, so that their entries are zero in a motion without modal loads.
 
         Parameters
         ----------
@@ -139,12 +139,12 @@ class RelativeModel:
         z_dot, z_ddot
             Rates and accelerations, (n_rates,).
         wrenches
-            Forces and moments from outside at markers, each (6,) [N, N m] in ground axes.
+            External forces and moments at markers, each (6,) [N, N m] in ground axes.
 
         Raises
         ------
         ModelError
-            If an array has another length, is not finite, or Euler parameters have another length than one.
+            If an array has another length or is not finite, or if Euler parameters do not have unit length.
         """
         self.take(z, z_dot, z_ddot)
         self.run(INVERSE)
@@ -158,8 +158,8 @@ class RelativeModel:
     ) -> Array:
         """Return the wrench of the joint on each body, (n_bodies, 6): force and moment [N, N m], ground axes.
 
-        About the point of the marker on the body (the frame origin of a free body), drives along the coordinates of the
-        joint included. Arguments as in `inverse_dynamics`.
+        Moments are about the point of the marker on the body (the frame origin of a free body). Drives along the
+        coordinates of the joint are included. Arguments as in `inverse_dynamics`.
         """
         self.take(z, z_dot, z_ddot)
         self.run(INVERSE)
@@ -191,22 +191,22 @@ class RelativeModel:
     ) -> Array:
         """Return the accelerations for given forces along the coordinates, (n_rates,).
 
-        Articulated bodies, in a time that grows with the number of bodies, modal coordinates eliminated in each
-        (Featherstone 2008, chapter 7; docs/recursive.md §4).
+        The method of articulated bodies takes a time proportional to the number of bodies; it eliminates the modal
+        coordinates body by body (Featherstone 2008, chapter 7; docs/recursive.md §4).
 
         Parameters
         ----------
         z, z_dot
             Positions (n_z,) and rates (n_rates,).
         force
-            Along the coordinates, (n_rates,); None: zero.
+            Forces along the coordinates, (n_rates,); None: zero.
         wrenches
             As in `inverse_dynamics`.
 
         Raises
         ------
         ModelError
-            If a coordinate is prescribed by a function of time, or what hangs at a joint has no inertia along it.
+            If a coordinate is prescribed by a function of time, or the subtree of a joint has no inertia along it.
         """
         if self.driven:
             raise ModelError(
@@ -236,8 +236,8 @@ class RelativeModel:
     def derivatives(self, z: Array, z_dot: Array, z_ddot: Array) -> "ForceDerivatives":
         """Return exact derivatives of `inverse_dynamics`, without external wrenches, by recursion.
 
-        By positions along the rates (rotations: R exp(dz)), by rates, by accelerations: docs/recursive.md §5, after
-        Carpentier & Mansard (2018) and Singh, Russell & Wensing (2022).
+        They are derivatives by positions along the rates (rotations: R exp(dz)), by rates and by accelerations, see
+        docs/recursive.md §5, after Carpentier & Mansard (2018) and Singh, Russell & Wensing (2022).
         """
         self.take(z, z_dot, z_ddot)
         self.run(TANGENTS)
@@ -272,7 +272,7 @@ class RelativeModel:
     def positions(self, state: State | None = None) -> tuple[Array, Array]:
         """Return z, (n_z,), and z_dot, (n_rates,), for a state of the bodies; None: the assembled state.
 
-        What joints hold is taken as held; angles are between -pi and pi. Rates are those nearest to the velocities.
+        Joints are assumed to be closed, angles are between -pi and pi, and rates fit the velocities by least squares.
         """
         e = self.expansion
         engine = e.compiled.placed if state is None else state_of_engine(e.compiled, state)
@@ -408,7 +408,7 @@ def checked(name: str, value: Array, n: int) -> Array:
 def relative_model(system: System) -> RelativeModel:
     """Return the recursive equations of a system in the coordinates of its tree.
 
-    Of forces, gravity counts; others are given to the calls (`force`, `wrenches`).
+    They include gravity; other forces are arguments of the methods (`force`, `wrenches`).
 
     Parameters
     ----------
@@ -418,8 +418,8 @@ def relative_model(system: System) -> RelativeModel:
     Raises
     ------
     ModelError
-        If a joint closes a loop or has no coordinates of its own, or the system holds forces, couplers or elements
-        besides gravity.
+        If a joint closes a loop or has no coordinates of its own, or the system has other forces than gravity, couplers
+        or elements.
     """
     where = f"relative_model: system {system.name!r}"
     others = [each for each in system.forces if not isinstance(each, Gravity)]

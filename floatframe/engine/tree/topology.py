@@ -1,10 +1,10 @@
 """The tree of a system: joints that become coordinates, and joints that stay constraints (docs/relative.md §1).
 
-The graph has bodies (and the ground) as nodes and joints with a chart as edges. Its spanning tree is that of least
-freedoms, Prim's algorithm from the ground: a cut joint of f freedoms leaves 6 - f constraints and a joint of the tree f
-coordinates, so that joints with many freedoms are the ones to cut. Of equal ones the joint at the body nearest to the
-ground is taken, then the first as given, so that loops open in their middle and the tree is the same every time. A part
-that hangs at no joint of the tree begins with a free body, its heaviest.
+The graph has bodies (and the ground) as nodes and joints with a chart as edges. Prim's algorithm, starting from the
+ground, finds the spanning tree with the fewest freedoms: a cut joint of f freedoms leads to 6 - f constraints, a joint
+of the tree to f coordinates, so that it is best to cut joints with many freedoms. Among joints with equally many
+freedoms it takes the one at the body nearest to the ground, then the first in the order of the system. So loops open in
+their middle, and the tree is unique. A part without a joint to the tree begins with a free body, its heaviest one.
 """
 
 import heapq
@@ -118,7 +118,7 @@ def make_tree(system: System) -> SystemTree:
 def charts_of(system: System, compiled: CompiledSystem) -> dict[int, tuple[Column, ...]]:
     """Return the columns of each joint that may become part of the tree, by the index of the joint.
 
-    Friction that grows with the normal force needs the reaction of its joint, so that this one stays a constraint.
+    Friction that grows with the normal force needs the reaction of its joint, so that this joint stays a constraint.
     """
     charts = {}
     model, n_q = compiled.model, n_q_of(system)
@@ -240,10 +240,10 @@ def jets_of(
 def spin_axes(compiled: CompiledSystem, ordered: list[Branch], far: list[int]) -> tuple[Array, Array]:
     """Return each body's symmetry axis for separate spin, axes of its joint end, and `most_across`.
 
-    These are bodies that are free or on a ball joint, rigid with all that is fixed to them; zero for others. Their
-    inertia about the joint, or about the centre of mass, is symmetric, or nearly so if they turn mostly about the axis.
-    Modes and coordinates that are carried around by the spin would be in other axes than the rotation that they are
-    added to, and stiff ones make steps unstable.
+    The axis is zero except for bodies that are free or on a ball joint, rigid including all bodies fixed to them, with
+    an inertia about the joint, or about the centre of mass, that is symmetric (or nearly so, if they rotate mostly
+    about the axis). Bodies with modes or with joints that spin with them are excluded: these coordinates would be in
+    other axes than the rotation to which they are added, and stiff ones make steps unstable.
     """
     model, axes, most_across = compiled.model, np.zeros((len(ordered), 3)), np.full(len(ordered), np.inf)
     fixed: list[list[int]] = [[i] for i in range(len(ordered))]  # bodies fixed to each body, including itself
@@ -266,7 +266,7 @@ def spin_axes(compiled: CompiledSystem, ordered: list[Branch], far: list[int]) -
 def common_inertia(compiled: CompiledSystem, bodies: list[int], marker: int) -> Array:
     """Return the inertia of rigid bodies about a marker on the first one, or about their centre of mass (-1).
 
-    In axes of the first, (3, 3).
+    The result, (3, 3), is in axes of the first body.
     """
     model, placed = compiled.model, compiled.placed
     mass, first, inertia = 0.0, np.zeros(3), np.zeros((3, 3))

@@ -1,8 +1,8 @@
 """Accelerations and reactions of a system in relative coordinates from its positions and rates (docs/relative.md §7).
 
-    M s_ddot + B w = -rho(s_ddot = 0, w = 0)        C s_ddot = -(second rates of what is held, at s_ddot = 0)
+    M s_ddot + B w = -rho(s_ddot = 0, w = 0)        C s_ddot = -(second rates of the constraints, at s_ddot = 0)
 
-with the matrices of `kernels.tangent` for the weights (1, 0, 0); rows that say what a wrench is have V w = -g.
+with the matrices of `kernels.tangent` for the weights (1, 0, 0). Rows that define a wrench have V w = -g.
 
 Described in `floatframe.integrators.relative_ode`.
 """

@@ -1,13 +1,14 @@
 """Change of the forces of a body with the motion of its carrier, ground axes, moments about one point O.
 
 With mass m, first moment s and inertia J about O, momentum p, and D = Σ q_dot_k D_k of the modes (kernels/body.py), the
-residual of the body, seen from what carries it, changes by
+residual of the body changes, relative to its carrier, by
 
     I xi_ddot + N xi_dot,   I = [[m, -s~], [s~, J]],   N = [[0, -2 p~], [0, Q]]
     Q y = 2 s × (y × v) - J (omega × y) + y × J omega + omega × J y + 2 D y - 2 r × (p × y)
 
-where in Q the origin of the body is at r, its velocity is v, and s, J are about it. The residual of mode k changes by
-(b, B)·xi_ddot and by the turning of xi_dot along 2 v × b - B × omega + 2 Y - (D_k + D_kᵀ) omega.
+where in Q the origin of the body is at r, its velocity is v, and s, J are about this origin. The residual of mode k
+changes by (b, B)·xi_ddot and by the product of the rotation part of xi_dot with
+2 v × b - B × omega + 2 Y - (D_k + D_kᵀ) omega.
 """
 
 from floatframe.engine.kernels.body import block, column, column_sum, coupling, gyroscopic, inertia_rate

@@ -3,7 +3,7 @@
 With the elastic angle th, its rate w and the left Jacobian T at th, the angular velocity is nu = T w, its rate
 T w_dot + c, c = (dT/dth [w]) w. With a = a(|th|), b = b(|th|) of kernels/rotation.py, p = th·w, x = th × w, y = th × x
 
-    c = a' p x + b' p y + b w × x,   a' = (da/dt)/t, b' = (db/dt)/t, and a'', b'' the same of these.
+    c = a' p x + b' p y + b w × x,   a' = (da/dt)/t, b' = (db/dt)/t, and likewise a'' and b'' from a' and b'.
 """
 
 import math
@@ -90,7 +90,7 @@ def turning_bias_by_angle(th, w, d):
 def second_turning(th, w, nu, v, b, b_1):
     """Return (d²T/dth² [w, w]) v, with nu = T w, b = T v and b_1 = (dT/dth [w]) v.
 
-    The derivative along w of (dT [w]) v - (dT [v]) w = nu × b, which variations of a motion fulfil:
+    Variations of a motion fulfil (dT [w]) v - (dT [v]) w = nu × b. Its derivative along w is
     (d²T [w, w]) v = (d²T [v, w]) w + c × b + nu × b_1.
     """
     turning = add(cross(turning_bias(th, w), b), cross(nu, b_1))

@@ -163,7 +163,8 @@ def newton_step(
 ) -> tuple[Array, Array]:
     """Return Newton's correction of the unknowns, (n_s,), and of c_k times the kept wrenches, (n_rows,).
 
-    is_exact: with the exact matrix, else with that of `kernels.kept_factors`. Not a number where it is singular.
+    is_exact: whether to use the exact matrix instead of that of `kernels.kept_factors`. The result is NaN if the matrix
+    is singular.
     """
     tangent = new_tangent_work(model, tree)
     outcome = call(
@@ -186,6 +187,6 @@ def accelerations(model: Model, work: Work, tree: Tree, joints: JointWork, tange
 
     Return whether they exist for the positions and rates.
 
-    Joints are moved by `joints.x`, which is zero after it.
+    Joints are moved by `joints.x`, which is then set to zero.
     """
     return call(model, work, tree, joints, tangent, what=ACCELERATE).status == DONE

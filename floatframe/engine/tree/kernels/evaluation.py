@@ -14,8 +14,8 @@ __all__ = ["evaluate_placed", "evaluate_tree"]
 def evaluate_tree(model, work, tree, joints, c_k):
     """Write residuals of bodies and rows, wrenches of the tree joints, and the projected residual.
 
-    As `kernels.evaluation.evaluate`, rows of joints of the tree being zero; `joints.own` keeps the residuals of the
-    bodies without these joints.
+    Like `kernels.evaluation.evaluate`, but the rows of the tree joints are zero. `joints.own` contains the residuals of
+    the bodies without these joints.
     """
     evaluate_markers(model, work)
     project_residuals(model, work, tree, joints, c_k)

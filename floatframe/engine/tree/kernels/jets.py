@@ -1,15 +1,15 @@
 """Variations of body motion by the unknowns, with their rates (docs/relative.md §5).
 
-A variation xi = (delta of the point at O, rotation), a spatial vector about a point O at rest, is that of a body and of
-all that hangs at it: xi of a body = xi of its parent + those of the columns of its joint, of the modes of the parent at
-the near marker, less those of its own modes at the far marker. With V the spatial velocity of the frame in which a
-screw S is fixed, V' its rate, a variation S theta has
+A variation xi = (displacement of the point at O, rotation) is a spatial vector about a point O at rest, and applies to
+a body and its whole subtree. xi of a body is the sum of xi of its parent, of the variations by the columns of its joint
+and by the modes of the parent at the near marker, minus those by its own modes at the far marker. With V the spatial
+velocity of the frame in which a screw S is fixed, and V' its rate, a variation S theta has
 
     xi = S theta      xi_dot = S theta_dot + V × S theta
     xi_ddot = S theta_ddot + 2 V × S theta_dot + (V' × S + V × (V × S)) theta
 
 where V × S = (omega × S_v + v × S_w, omega × S_w). In a step theta, theta_dot, theta_ddot are c_k, c_d, c_m times the
-correction of the unknown. For the group of rotations, of which the unknown is the vector x with Q = Q_start exp(x),
+correction of the unknown. The unknown of a group of rotations is the vector x with Q = Q_start exp(x). Then
 theta = T(x) dx, and the rates z_dot, z_ddot, in axes of B, change by d(z_dot) = theta_dot + z_dot × theta.
 """
 

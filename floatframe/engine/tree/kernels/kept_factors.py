@@ -1,18 +1,20 @@
 """Newton's correction over the tree with body matrices that are reused in many steps (docs/relative.md §6).
 
-An approximation of `kernels.tree_factors`, six wide instead of eighteen and symmetric: a body turns and moves as a
-whole, so that its own matrix H, mass, damping and stiffness weighted, is constant in its axes but for its deformation;
-its symmetric part is made once and kept for many steps. The screws of modes at the joints and the poses of bodies are
-renewed with the factors. Left out are the terms that come from the rates and accelerations of the screws and from the
-turning of forces: they are weighted with h and h² and cost an iteration where they count, never accuracy. With X the
-motion of a body, Y that of what holds it, u its columns, q its modes, S those of its far, S_c those of its near marker
-for child c, all in its axes about its origin,
+This approximates `kernels.tree_factors` by symmetric matrices with six instead of eighteen columns. In body axes, the
+own matrix H of a body, the weighted sum of mass, damping and stiffness, is constant except for the deformation. Its
+symmetric part is therefore computed once and reused in many steps. The screws of modes at the joints and the poses of
+bodies are renewed with the factors. Terms due to the rates and accelerations of the screws and to the rotation of
+forces are omitted: they have the weights h and h², and can cost an iteration, but never accuracy. With X the motion of
+a body, Y that of its carrier, u its joint columns, q its modes, S their screws at its far marker, S_c those at its near
+marker for child c, all in its axes about its origin,
 
-    (1)  X = Y + J u - S q: its matrix [A B; Bᵀ E] by (X, q) becomes by (Y + J u, q)  A, B' = B - A S, E - SᵀB' - BᵀS
-    (2)  X_c = Ad_c (Y + J u + T q), T = S_c - S: each child adds P', P' T, TᵀP' T to them, P' = Ad_cᵀ P_c Ad_c
-    (3)  the front of (q, u, Y), [E B'ᵀJ B'ᵀ; . JᵀA J JᵀA; . . A], is factorised by Cholesky for q and u: P is left at Y
+    (1)  X = Y + J u - S q: the matrix [A B; Bᵀ E] for (X, q) becomes [A B'; B'ᵀ E - SᵀB' - BᵀS], B' = B - A S, for
+         (Y + J u, q)
+    (2)  X_c = Ad_c (Y + J u + T q), T = S_c - S: each child adds P', P' T, TᵀP' T to its blocks, P' = Ad_cᵀ P_c Ad_c
+    (3)  Cholesky's method eliminates q and u from the front of (q, u, Y), [E B'ᵀJ B'ᵀ; . JᵀA J JᵀA; . . A]; the
+         remaining block of Y is P
 
-Fronts are upper halves, their rows Uᵀ of the factors with inverse diagonals.
+Fronts are stored as upper halves. After factorisation their rows are those of the factor U, with inverse diagonals.
 """
 
 import math
@@ -261,8 +263,8 @@ def add_child(P, T, Z, F, n):
 def solve_kept(model, tree, joints, tangent, c_k):
     """Write the corrections of the unknowns into tangent.step, and of bodies (body axes) into tangent.X.
 
-    From the leaves inwards minus the force of a subtree at rest, `b`, and the right sides z = U⁻ᵀ (q, u); then outwards
-    Y, q, u, and X.
+    First, from the leaves inwards, compute minus the force of each subtree at rest, `b`, and the right sides
+    z = U⁻ᵀ (q, u); then, outwards, Y, q, u and X.
     """
     x, b = tangent.step, tangent.b
     x[:] = 0.0
@@ -271,7 +273,7 @@ def solve_kept(model, tree, joints, tangent, c_k):
         i = tree.order[place]
         n_l, n, parent = tree.s0[i + 1] - tree.s0[i], model.bodies.n_q[i], tree.parent[i]
         z = tangent.z[tree.s0[i] + 6 * i : tree.s0[i + 1] + 6 * i + 6]
-        for k in range(n):  # contributions of children are in x
+        for k in range(n):  # x already contains the contributions of children
             z[k] = x[tree.m0[i] + k] - c_k * joints.residual[tree.m0[i] + k]
         for s in range(tree.s0[i], tree.m0[i]):
             total = -c_k * joints.residual[s]

@@ -1,14 +1,15 @@
 """Body motion from joint motion, and the reverse (docs/relative.md §3).
 
-With n, f the markers of a joint at parent and body, A, B its ends, D = A_A d, s = Σ t_k z_dot_k, w = Σ a_k z_dot_k and
-s', w' the same with z_ddot_k,
+With n, f the markers of a joint at parent and body, A, B its ends, D = A_A d, s = Σ t_k z_dot_k, w = Σ a_k z_dot_k, and
+s', w' the same sums with z_ddot_k,
 
     r_B = r_A + D,  A_B = A_A Q            v_B = v_A + omega_A × D + s,  omega_B = omega_A + w
     a_B = a_A + alpha_A × D + omega_A × (omega_A × D + 2 s) + s'
     alpha_B = alpha_A + w' + Σ omega_side × a_k z_dot_k
 
-and from a marker to its body as in `kernels.marker`, solved for the motion of the body. All hold as well with the body
-at A. Deformations of both bodies, their rates and accelerations are those of `state.q`, `state.u`, `state.u_dot`.
+The motion of the body follows from that of its marker by the equations of `kernels.marker`. All equations are valid
+also if the body is at A. Deformations of both bodies, their rates and accelerations are in `state.q`, `state.u`,
+`state.u_dot`.
 """
 
 from floatframe.engine.kernels.compiler.compilation import inner, loops
@@ -178,7 +179,7 @@ def put_body(model, work, tree, i, r, A, v, omega, a, alpha):
 def joint_motion(model, work, tree, joints):
     """Write d, Q, z_dot, z_ddot of all joints from the body motion.
 
-    Coordinates are those nearest to the motion, so that one that the joints do not allow is left out.
+    The coordinates fit the motion by least squares; motions that the joints do not allow are ignored.
     """
     for i in range(tree.parent.shape[0]):
         end_a, end_b = joint_ends(model, work, tree, i)

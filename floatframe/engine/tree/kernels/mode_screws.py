@@ -1,8 +1,8 @@
 """Screws of the modes at a marker, their rates, and their derivatives by the modes.
 
 In axes of the body about its origin the screw of mode k is S = (Psi_t + rho × b, b), b = T' Psi_r; its rates relative
-to the body follow from those of rho, of the elastic angle and of Psi(q) = Psi - K_P q. A variation S theta of what a
-frame with the spatial velocity V, its rate V', carries has xi = S theta and, with S' and S'' from those rates,
+to the body follow from those of rho, of the elastic angle and of Psi(q) = Psi - K_P q. A variation S theta in a frame
+with the spatial velocity V and its rate V' has xi = S theta and, with these rates S' and S'' of the screw,
 
     xi_dot  = S theta_dot + (S' + V × S) theta
     xi_ddot = S theta_ddot + 2 (S' + V × S) theta_dot + (S'' + 2 V × S' + V' × S + V × (V × S)) theta
@@ -30,7 +30,7 @@ def mode_screw(model, work, m, i, k):
 def mode_rate(model, work, m, i, k):
     """Return the screw of mode k at marker m, its rate relative to the body, and (dT'/dt) Psi_r.
 
-    `work.markers.bend_dot` has been written for the marker.
+    `work.markers.bend_dot` must have been written for the marker.
     """
     markers, n = work.markers, model.bodies.n_q[i]
     T, rho, rho_1 = markers.T_left[m], vector(markers.rho[m]), vector(markers.rho_dot[m])

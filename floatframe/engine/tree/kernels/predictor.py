@@ -1,8 +1,8 @@
 """Initial guess of a step in relative coordinates, from extrapolated algorithmic accelerations.
 
-So long as steps of one size follow each other, by the constant, the line or the parabola through the last of them,
-whichever would have led nearest to those of the step before: smooth motions follow a parabola, modes that the step does
-not resolve turn about from step to step.
+While steps have equal size, the accelerations are extrapolated by the constant, the line or the parabola through the
+last ones, whichever would have predicted those of the previous step best: smooth motions follow a parabola, while modes
+that the step does not resolve change their sign from step to step.
 """
 
 from floatframe.engine.kernels.compiler.compilation import inner
@@ -76,5 +76,5 @@ def learn(tree, tangent, memory):
         tangent.a_first[s] = tangent.a_before[s]
         tangent.a_before[s] = tangent.a_last[s]
         tangent.a_last[s] = memory.a[tree.slot[s]]
-    if tangent.V.shape[0] == 0:  # kept wrenches need the iterations that this would save
+    if tangent.V.shape[0] == 0:  # with kept wrenches, a better prediction saves no iterations
         tangent.n_known = min(tangent.n_known + 1, 3)

@@ -1,8 +1,8 @@
 """Projection of residuals onto the tree: joint reactions, equations of coordinates and modes.
 
-From the leaves inwards the wrench of a joint on its body is what the residual of the body, with what hangs at it, asks
-for; it acts on the parent with the opposite sign. Its part along a coordinate, less the force Q that acts there, is the
-equation of the coordinate; what is left at the modes are theirs (docs/relative.md §4).
+From the leaves inwards, the wrench of a joint on its body balances the residual of the body and its subtree, and acts
+on the parent with the opposite sign. Its component along a coordinate, minus the force Q that acts there, is the
+equation of the coordinate. The remaining modal residuals are the equations of the modes (docs/relative.md §4).
 """
 
 from floatframe.engine.kernels.compiler.compilation import inner
@@ -19,7 +19,8 @@ __all__ = ["project", "put_reactions", "subtract_slopes"]
 def project(model, work, tree, joints):
     """Write the wrenches of all tree joints on their markers B, and the projected residual.
 
-    `work.bodies.residual` is that of bodies without joints of the tree; it is left with what remains: only modal parts.
+    Before, `work.bodies.residual` contains the residual of the bodies without the tree joints; afterwards only modal
+    parts remain.
     """
     n_b = tree.order.shape[0]
     for place in range(n_b - 1, -1, -1):

@@ -56,7 +56,7 @@ def spatial_motion(p, v, omega, a, alpha):
 
 @small
 def world_screw(R, p, S):
-    """Return in the ground a spatial vector given about point p in axes R of a frame."""
+    """Return, in ground axes about the origin, a spatial vector given in axes R about point p."""
     ang = turned(R, S[1])
     return add(turned(R, S[0]), cross(p, ang)), ang
 

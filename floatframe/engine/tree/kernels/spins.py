@@ -1,9 +1,9 @@
 """Separately integrated spin of axisymmetric bodies that are free or on a ball joint (docs/relative.md §6).
 
-As in absolute coordinates (`kernels.generalized_alpha`), with the motion of the body against its parent, omega and
-alpha in axes of the body's end of the joint: these are z_dot and z_ddot of the three columns of rotation, the last of
-the joint, where that end is B. Where it is A, they are -Q z_dot and -Q z_ddot. The increments x of these columns are
-theta = across + along e then, whichever end it is, and turn the body by exp(across) exp(along e).
+This is done as in absolute coordinates (`kernels.generalized_alpha`), but with omega and alpha of the body relative to
+its parent, in axes of the body's end of the joint. If this end is B, they are z_dot and z_ddot of the three columns of
+rotation, which are the last ones of the joint; if it is A, they are -Q z_dot and -Q z_ddot. In both cases the
+increments x of these columns are theta = across + along e, and rotate the body by exp(across) exp(along e).
 """
 
 from floatframe.engine.kernels.compiler.compilation import inner, loops, small
@@ -173,7 +173,7 @@ def turning_by_columns(tree, joints, i):
 def spin_variations(tree, joints, i, y, theta, c_m, c_d, c_k):
     """Return theta_dot, theta_ddot of `kernels.jets` for a change y of a spinning body's unknowns, axes of B.
 
-    omega follows c_d y and alpha - w omega × e follows c_m y, both turned on by c_k (e · y) about -e.
+    omega changes by c_d y, and alpha - w omega × e by c_m y; both are then rotated by c_k (e · y) about -e.
     """
     k, Q = first_rotation(tree, i), joints.Q[i]
     e, omega, alpha = vector(tree.spin_axis[i]), vector(joints.rate[k:]), vector(joints.acceleration[k:])

@@ -1,7 +1,7 @@
 """Time loop of the generalized-alpha method in relative coordinates.
 
-What is remembered from step to step is absolute (`kernels.memory.Memory`), but for the algorithmic accelerations: those
-of an unknown stand where `Tree.slot` says. Joints are found from the bodies at the beginning of each step.
+The memory between steps is absolute (`kernels.memory.Memory`), except for the algorithmic accelerations, which are
+those of the unknowns; `Tree.slot` has their indices. Each step first computes the joint motion from the body motion.
 
 Described in `floatframe.integrators.relative`.
 """
@@ -132,7 +132,8 @@ def begin_anew(model, work, tree, joints, tangent, memory, t):
 def renew(model, work, tree, joints, tangent, c_m, c_d, c_k):
     """Renew the factors of the Newton matrix; return whether it is regular.
 
-    Exact ones where wrenches are kept or `tangent.exactly` asks for them, else those of `kernels.kept_factors`.
+    The factors are exact if wrenches are kept or `tangent.exactly` requires it, otherwise those of
+    `kernels.kept_factors`.
     """
     weigh(model, work, tree, joints, tangent)
     if tangent.V.shape[0] > 0 or tangent.exactly > 0:
@@ -174,7 +175,8 @@ def spins_far(tree, joints):
 def turns_too_far(work, tree, joints, length):
     """Return the first body in a loop, or -1, whose joint rotates it by more than `MOST_TURN` in the step.
 
-    Where the loop leaves it on the axis of this turn, any turn is followed, and so are those that are prescribed.
+    Rotations of any size are correct if they are prescribed, or if the marker at which the loop leaves the body is on
+    the axis of rotation.
     """
     for e in range(tree.loop_body.shape[0]):
         i = tree.loop_body[e]
@@ -196,7 +198,8 @@ def turns_too_far(work, tree, joints, length):
 def hold_velocities(model, work, tree, joints, tangent, by_rate, by_acceleration, c_k):
     """Add the rate correction that closes position constraints in velocity; return its squared norm.
 
-    As `kernels.generalized_alpha.hold_velocities`, of unknowns s_dot by what joints and couplers that are kept hold.
+    Like `kernels.generalized_alpha.hold_velocities`, for the unknowns s_dot and the constraints of kept joints and
+    couplers.
     """
     step, mu = tangent.step, work.solver.mu
     step[:] = 0.0
@@ -273,8 +276,8 @@ def update(model, work, tree, joints, tangent, by_rate, by_acceleration, c_k):
 def local_error(model, work, tree, joints, tangent, memory, order, h):
     """Return the estimated error of a converged step's increment, as in the absolute formulation.
 
-    Accelerations of bodies are affine in those of the unknowns, so that the change of these in a step, added to them,
-    gives that of the bodies; then they are as before.
+    Accelerations of bodies are affine in those of the unknowns. Therefore the changes of the unknowns' accelerations in
+    the step are added to these for a moment, which gives the changes for the bodies.
     """
     alpha_m, alpha_f, u_dot = order.alpha_m, order.alpha_f, work.state.u_dot
     for i in range(tree.parent.shape[0]):
@@ -329,11 +332,14 @@ def accelerations(work, tree, joints, memory, s):
 def one_step(model, work, memory, tree, joints, tangent, order, h):
     """Advance the memory by one step, unless the estimated error is larger than allowed.
 
-    Return (status, body that turns too far, last correction by the allowed one, error; -1 if not estimated). Factors of
-    an earlier step serve as long as corrections shrink fast with them; where they do not, the step is begun anew with
-    its own, and the more steps have theirs at once the more often that happens (long chains: their mass matrix changes
-    much with the shape). A step that does not converge so is begun once more, with exact factors in every iteration:
-    what approximate ones have led far away does not come back.
+    Return (status, body that rotates too far, last correction divided by the allowed one, error or -1 if it is not
+    estimated).
+
+    Factors of an earlier step are used as long as corrections shrink fast with them. Otherwise the step restarts with
+    its own factors. The more often this happens, the more of the following steps use their own factors from the
+    beginning (as for long chains, whose mass matrix changes much with their shape). If the step still does not
+    converge, it restarts again with exact factors in every iteration, because an iterate that approximate factors have
+    led far away does not return.
     """
     alpha_m, alpha_f, beta, gamma = order.alpha_m, order.alpha_f, order.beta, order.gamma
     c_k = beta * h * h
@@ -355,7 +361,7 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
     is_last_try = False
     predict(model, work, tree, joints, tangent, memory, order, h)
     holds = order.stabilized != 0 and tree.held.shape[0] > 0
-    if holds:  # difference between velocities and the rates of positions, with the factors
+    if holds:  # the correction of velocities needs new factors
         work.solver.is_due = 1
     if spins_far(tree, joints):
         tangent.exactly = max(tangent.exactly, 1)
@@ -363,7 +369,7 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
     # iterations at which factors were renewed, or the step was restarted
     is_old, made, begun = work.solver.is_due == 0, -1, 0
     factorisations = work.counted.factorisations
-    is_open = tangent.V.shape[0] == 0  # kept wrenches are not in the norm
+    is_open = tangent.V.shape[0] == 0  # no kept wrenches, which the norm does not include
     has_states = model.states.row.shape[0] + model.laws.equation.shape[0] > 0
     while iteration < order.max_iterations:
         evaluate_placed(model, work, tree, joints, c_k)
@@ -439,7 +445,7 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
             work.solver.is_due = 1
             if tangent.is_exact == 0:
                 tangent.is_kept = 0
-                if begun < made < iteration:  # factors of an iterate near the solution are not good enough either
+                if begun < made < iteration:  # even factors of an iterate near the solution are not accurate enough
                     tangent.exactly = EXACT_STEPS
         if of_states > max(1.0, SLOW * last_of_states) or iteration >= MANY:
             work.solver.is_due = 1
@@ -516,7 +522,7 @@ def try_tree_step(model, work, memory, others, order, t, h):
 def write_next_row(model, work, memory, others, t, rows):
     """Write the next result row.
 
-    Gaps of loops have rounding errors, like those of all joints in absolute ones.
+    In loops the gaps have roundoff errors, like those of all joints in absolute coordinates.
     """
     tree, joints, tangent = others
     write_tree_row(model, work, memory, tree, joints, t, rows)

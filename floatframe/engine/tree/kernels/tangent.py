@@ -1,12 +1,12 @@
 """The exact Newton matrix in relative coordinates (docs/relative.md §5).
 
-With the force F_i of body i (its residual as a spatial vector about O), F the sum over a subtree, J the screw of an
-unknown, residuals are ρ = J · F for columns, and those of modes with the same sums at their markers. Then
+Let F_i be the force of body i (its residual as a spatial vector about O), F the sum over a subtree, and J the screw of
+an unknown. The residual of a joint column is rho = J · F; modal residuals contain the same sums at their markers. Then
 
     d rho = J · dF + (xi × J) · F        dF = D jet,   D the sum of the bodies of the subtree, (6, 18)
 
-since all bodies of a subtree move alike by what moves its first. Derivatives of the projection, of the kinematics and
-of the forces that stay in axes of bodies or ground are all there.
+because a motion of the first body moves all bodies of its subtree alike. This includes the derivatives of the
+projection, of the kinematics, and of forces that are fixed in body axes or ground axes.
 """
 
 from floatframe.engine.kernels.body import moved_inertia, newton_block
@@ -71,7 +71,8 @@ __all__ = [
 def write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k):
     """Write jets, derivatives of the bodies, and P, V of the connections outside the tree.
 
-    `evaluate_tree` has been called for the iterate; wrenches of joints of the tree are taken away.
+    `evaluate_tree` must have been called for the iterate. The wrenches of the tree joints on the markers are set to
+    zero.
     """
     rate = c_d / c_k if c_k > 0.0 else 0.0
     write_jets(model, work, tree, joints, tangent, c_m, c_d, c_k, rate)
@@ -105,8 +106,8 @@ def write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k):
 def of_body(model, work, joints, tangent, i, c_m, c_d, c_k):
     """Write D, F and modal residual derivatives of body i without its subtree, and H with its mode columns.
 
-    D and the rows of the modes are those of body_jets.py, and what turns with the body but for `by_turn` and the
-    acceleration a, which stay in the ground.
+    D and the rows of the modes are those of body_jets.py, plus the rotation of the residual with the body. The terms
+    with `by_turn` and the acceleration a correct this for quantities that do not rotate with it.
     """
     n, u0, q0 = model.bodies.n_q[i], model.bodies.u0[i], model.bodies.q0[i]
     turning = work.bodies.T_right[i]

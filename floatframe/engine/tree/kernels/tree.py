@@ -1,15 +1,15 @@
 """The tree of bodies as a record, and the working arrays of its recursions.
 
-A joint of the tree has marker A and marker B, of which one is on the body (far), the other on its parent (near). Its
-columns, one for each coordinate rate z_dot_k, say how B moves as seen from A (docs/relative.md §2):
+A joint of the tree has a marker A and a marker B; one is on the body (far), the other on its parent (near). Its
+columns, one for each coordinate rate z_dot_k, describe the motion of B relative to A (docs/relative.md §2):
 
     v_B - v_A - omega_A × d = Σ A_A tau_k z_dot_k        omega_B - omega_A = Σ a_k z_dot_k
 
-with a_k = A_A alpha_k for side 0 (a screw fixed in A, through its point), A_B alpha_k for side 1 (fixed in B). Bodies
-that hang at nothing have a chart of six columns: marker A is the ground frame, marker B the frame of the body.
+with a_k = A_A alpha_k for side 0 (a screw fixed in A, through its point), A_B alpha_k for side 1 (fixed in B). Free
+bodies have six columns: marker A is the ground frame, marker B the frame of the body.
 
-Sizes beside those of `kernels.model`: n_k columns; n_s unknowns = columns that are not prescribed, and modes, body by
-body: those of body i are s0[i]:s0[i + 1], first its joint.
+Sizes in addition to those of `kernels.model`: n_k columns and n_s unknowns, which are the columns that are not
+prescribed, and the modes. They are ordered by bodies: s0[i]:s0[i + 1] are those of body i, first those of its joint.
 """
 
 from typing import NamedTuple
@@ -44,7 +44,7 @@ class Tree(NamedTuple):
     m0: IntArray = integer(n_b)  #: index of its first mode among the unknowns
     column: IntArray = integer(n_s)  #: joint column of each unknown, -1 for a mode
     mode: IntArray = integer(n_s)  #: index of each unknown in q, -1 for a joint coordinate
-    #: index of its algorithmic acceleration in the memory, in which a mode keeps its own place
+    #: index of its algorithmic acceleration in the memory; for a mode the same as that of its velocity
     slot: IntArray = integer(n_s)
     tau: Array = real(n_k, 3, unit="1 or m/rad")  #: translation of the column at unit rate, axes of A
     alpha: Array = real(n_k, 3)  #: rotation of the column at unit rate, axes of A or B

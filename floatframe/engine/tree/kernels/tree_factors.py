@@ -1,15 +1,15 @@
 """Newton's correction in relative coordinates, with a cost linear in the number of bodies (docs/relative.md §5).
 
-With Y the jet of the near marker of a joint, x the unknowns of its body (columns, modes), b the force that bodies
-further out bring along and A its derivative by the jet X of the body,
+With Y the jet of the near marker of a joint, x the unknowns of its body (columns, modes), b the force from bodies
+further out, and A the derivative of the subtree's force by the jet X of the body,
 
-    X = Y + j x,   dF = A X + H x + b          (H: by the modes of the body)
-    L x + R Y = r                              (equations of columns and modes, b taken to the right)
+    X = Y + j x,   dF = A X + H x + b          (H: derivative by the modes of the body)
+    L x + R Y = r                              (equations of columns and modes, with b in the right side)
     x = G Y + g,   dF = P Y + p,   P = A + W G,  p = b + W g,  W = A j + H
 
-from the leaves inwards, each adding P and p to its parent: to the force of the body, and by its screws J to the
-equations of the modes that move the near marker. Outwards Y = X of the parent + j of its modes there, and x follows.
-Wrenches that are kept are found from V - C K⁻¹ B, a column of K⁻¹ B being one more solution.
+From the leaves inwards, each joint adds P and p to its parent: to the force of the body and, through its screws J, to
+the equations of the modes that move the near marker. Then, outwards, Y is X of the parent plus j of its modes at the
+marker, and x follows. Kept wrenches are found from V - C K⁻¹ B; each column of K⁻¹ B is one more solution.
 """
 
 from floatframe.engine.kernels.body import newton_block

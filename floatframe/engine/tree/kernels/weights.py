@@ -1,7 +1,7 @@
 """Norms in relative coordinates: of corrections by body motion, of unknowns by the mass that moves.
 
-Corrections are measured as in absolute coordinates, by how bodies and modes move, so that a tolerance means the same: a
-turn of a joint near the root that those behind it take back is no large one.
+Corrections are measured by the motion of bodies and modes, as in absolute coordinates, so that a tolerance means the
+same: a large rotation of a joint near the root counts as small if the next joints compensate it.
 """
 
 from floatframe.engine.kernels.body import moved_inertia

@@ -1,14 +1,14 @@
 """Articulated bodies: solution of M x = b for a tree with stored factors, linear in the number of bodies.
 
-In ground axes, each node about its own origin, S the motion by its rates, H = [[I, ..]] of a flexible body
-(composite.py) with articulated instead of composite bodies in it:
+In ground axes, each node about its own origin, with S the motion for unit rates, and H = [[I, ..]] the matrix of a
+flexible body (composite.py) built from articulated instead of composite bodies:
 
-    (1) from the tips  U = I S, D = Sᵀ U, what the node shows its parent: I - U D⁻¹ Uᵀ, shifted; of a flexible body
-                       U = top of H T, G = Tᵀ H T, T = [[S], [0, 1]] over rates of the joint and modes
-    (2) solve          from the tips u = b - Sᵀ w (and, of modes, less what hangs on their markers), w + U D⁻¹ u goes up
-                       from the base x = D⁻¹ (u - Uᵀ a), a + S x goes on
+    (1) from the tips  U = I S, D = Sᵀ U; the parent gets I - U D⁻¹ Uᵀ, shifted; for a flexible body U = top of H T,
+                       G = Tᵀ H T, T = [[S], [0, 1]] for the rates of the joint and the modes
+    (2) solve          from the tips u = b - Sᵀ w (for modes also minus the wrenches of subtrees at their markers); the
+                       parent gets w + U D⁻¹ u; from the base x = D⁻¹ (u - Uᵀ a); the children get a + S x
 
-Forward dynamics is b = forces - inverse dynamics without accelerations. Sources: Featherstone (2008), chapter 7;
+Forward dynamics uses b = forces - inverse dynamics without accelerations. Sources: Featherstone (2008), chapter 7;
 Rodriguez, Jain & Kreutz-Delgado (1992) write the same as a factorisation of M.
 """
 

@@ -2,8 +2,8 @@
 
     V_k = shift(V_parent) + above q_dot of a flexible parent + S z_dot of the joint + S q_dot of its own modes
 
-where (v, w) shifted by p is (v + w × p, w). The marker above moves by Psi_t, T Psi_r with each mode; the frame of a
-flexible body moves against its own marker, which the joint holds.
+where (v, w) shifted by p is (v + w × p, w). The marker above moves by Psi_t, T Psi_r with each mode. The joint fixes
+the own marker of a flexible body, so that the frame of the body moves opposite to the motion of this marker.
 """
 
 from floatframe.engine.kernels.compiler.compilation import loops, small

@@ -1,11 +1,11 @@
 """Composite bodies: mass matrix of a tree, and matrices of flexible bodies with their subtrees.
 
-In ground axes, of each node k about its own origin, p from the origin of the parent:
+In ground axes, for each node k about its own origin, with p from the origin of the parent:
 
-    (1) m, s, J of the subtree, joints and modes held: those of the body and of the subtrees that it carries
-    (2) of a flexible body H, (6 + n, 6 + n): its own mass matrix, and Σ Cᵀ I C of the subtrees, C = [shift, above]
-    (3) F = I S of each rate of the joint; of a flexible body F = H [S; e] of each rate of joint and modes
-    (4) M: F along the rates of the node itself, then of all nodes above, the wrench going up by shifts
+    (1) m, s, J of the subtree with fixed joints and modes: the sum over the body and the subtrees that it carries
+    (2) for a flexible body H, (6 + n, 6 + n): its own mass matrix plus Σ Cᵀ I C of the subtrees, C = [shift, above]
+    (3) F = I S for each rate of the joint; for a flexible body F = H [S; e] for each rate of joint and modes
+    (4) M: components of F along the rates of the node itself, then, shifted, along those of all nodes above
 
 Sources: Walker & Orin (1982); Featherstone (2008), chapter 6.
 """

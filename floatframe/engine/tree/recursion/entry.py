@@ -51,12 +51,14 @@ __all__ = [
 
 
 # poses of nodes in their parents and in the ground (docs/recursive.md §1) --------------------------------
-# The outer frame of a joint in the frame of the parent is R, p, and that of a rigid body; of one joined to a rigid one,
+# R, p are the outer frame of a joint in the frame of the parent; this is also the frame of a rigid body. If the parent
+# is rigid,
 #
 #     R = A E,  p = r + A d        with A, r of the joint in the parent and E, d of the joint alone
 #
-# An elastic parent moves A and r with its modes: A = exp(th) A, r = rho. An elastic body lies in the outer frame of its
-# joint by its own marker, axes R_own = exp(th) F at rho: its axes are R R_ownᵀ, its origin is p - R R_ownᵀ rho.
+# An elastic parent moves A and r with its modes: A = exp(th) A, r = rho. The own marker of an elastic body, with the
+# axes R_own = exp(th) F at rho, coincides with the outer frame of its joint. So the axes of the body are R R_ownᵀ, and
+# its origin is p - R R_ownᵀ rho.
 
 
 @inner

@@ -1,9 +1,9 @@
 """Nodes from the tree of a system: each joint becomes a chain of elementary joints (docs/recursive.md §1).
 
-With Q the rotation from marker A to B, Q0 that at zero coordinates, a joint moves B as seen from A by translations
-along axes of A, then rotations about axes of A, then rotations about axes of B: exp(a x) Q0 exp(b y) =
-exp(a x) exp(Q0 b y) Q0, so that in the axes of A at zero coordinates it is one chain of screws, with Q0 at its end.
-Where the parent holds marker B the chain is walked backwards with opposite signs.
+Let Q be the rotation from marker A to B, and Q0 its value at zero coordinates. A joint moves B relative to A by
+translations along axes of A, then rotations about axes of A, then rotations about axes of B. Because
+exp(a x) Q0 exp(b y) = exp(a x) exp(Q0 b y) Q0, it is one chain of screws in the axes of A at zero coordinates, with Q0
+at its end. If marker B is on the parent, the chain is reversed, with opposite signs.
 """
 
 from collections.abc import Sequence
@@ -143,7 +143,7 @@ def expansion_of(system: System) -> Expansion:
         chain = chain_of(tree, i, Q0)
         if back:
             chain, Q0 = [each.reversed_in(Q0) for each in reversed(chain)], Q0.T
-        end = int(tree.column0[i + 1] - tree.column0[i])  # of a flexible body the last rates come before its modes
+        end = int(tree.column0[i + 1] - tree.column0[i])  # modes of a flexible body must follow the joint's last rate
         if not chain or (is_flexible(model, i) and chain[-1].first + N_RATES[chain[-1].kind] != end):
             chain.append(Elementary(FIXED, chain[-1].axes if chain else Q0, 0.0, 0.0, end))
         parent_body = int(tree.parent[i])
@@ -318,12 +318,12 @@ def joint_positions(expansion: Expansion, i: int, d: Array, Q: Array) -> Array:
     Q0 = zero_rotation_of(expansion.system, expansion.compiled, tree, i)
     chain = chain_of(tree, i, Q0)
     turning = [each for each in chain if each.turn != 0.0 and each.kind not in (TRANSLATION, ROTATION)]
-    M = Q @ Q0.T  # for rotations about axes of A at zero coordinates, one after the other
+    M = Q @ Q0.T  # product of the rotations about axes of A at zero coordinates, one after the other
     angles = {}
     if len(turning) == 1:
         x, y, _ = turning[0].axes.T
         angles[turning[0].first] = np.arctan2(y @ M @ x - x @ M @ y, x @ M @ x + y @ M @ y) / turning[0].turn
-    elif len(turning) == 2:  # at right angles: M e_2 rotates with the first, Mᵀ e_1 against the second
+    elif len(turning) == 2:  # perpendicular axes: M e_2 rotates with the first, Mᵀ e_1 opposite to the second
         first, second = turning
         e_1, e_2 = first.axes[:, 2], second.axes[:, 2]
         angles[first.first] = turn_between(e_1, e_2, M @ e_2) / first.turn
@@ -342,5 +342,5 @@ def joint_positions(expansion: Expansion, i: int, d: Array, Q: Array) -> Array:
 
 
 def turn_between(axis: Array, a: Array, b: Array) -> float:
-    """Return the angle about an axis from a to b, which are both normal to it."""
+    """Return the angle about an axis from a to b, both of which are normal to the axis."""
     return float(np.arctan2(axis @ np.cross(a, b), a @ b))

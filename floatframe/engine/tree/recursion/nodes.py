@@ -1,13 +1,13 @@
 """The tree of bodies with elementary joints as records, and the working arrays of the recursions.
 
-A node carries one elementary joint: none (0 rates), a screw about the third axis of its frames (1), a translation (3)
-or a rotation (3). A cylindrical, universal or planar joint and the free motion of a body are chains of nodes, of which
-the last one carries the body and the others nothing. The frame of a node is the outer frame of its joint; on a rigid
-body all moments are taken in that frame, so that a rigid body needs no transformation but that of its joint. On a
-flexible body it is the frame of the body, and the markers of its joints move in it.
+A node has one elementary joint: a fixed one (0 rates), a screw about the third axis of its frames (1), a translation
+(3) or a rotation (3). A cylindrical, universal or planar joint and the free motion of a body are chains of nodes, of
+which only the last one carries a body. The frame of a node is the outer frame of its joint. The moments of a rigid body
+refer to this frame, so that the only transformation of a rigid body is that of its joint. For a flexible body it is the
+frame of the body, in which the markers of its joints move.
 
-Sizes: n_n nodes, n_x positions, n_v rates. Positions and rates stand body by body: those of the joint, then the modal
-coordinates. A rotation has four positions (Euler parameters w, x, y, z) and three rates (angular velocity).
+Sizes: n_n nodes, n_x positions, n_v rates. Positions and rates are ordered by bodies: those of the joint, then the
+modal coordinates. A rotation has four positions (Euler parameters w, x, y, z) and three rates (angular velocity).
 """
 
 from typing import NamedTuple
@@ -58,7 +58,7 @@ class Nodes(NamedTuple):
     u0: IntArray = integer(n_n)  #: index of the body's first velocity in `state.u`
     xq: IntArray = integer(n_n)  #: index of the body's first mode among the positions
     vq: IntArray = integer(n_n)  #: index of the body's first mode among the rates
-    above: IntArray = integer(n_n)  #: marker of a flexible parent that carries the joint, else -1
+    above: IntArray = integer(n_n)  #: marker of the joint on a flexible parent, else -1
     own: IntArray = integer(n_n)  #: marker of a flexible body at its joint, else -1
     F: Array = real(n_n, 3, 3)  #: outer frame of the joint in axes of the undeformed flexible body
     #: mass of the body; its moments refer to the outer frame of the joint, undeformed

@@ -1,21 +1,23 @@
 """Exact derivatives of inverse dynamics by positions and rates, by recursion (docs/recursive.md §5).
 
-All in ground axes about the origin of the ground. A rate j moves all that hangs at it by S_j. Seen from there (turning
-along), the velocities of all these bodies change by one motion Y_j, and their accelerations A, as spatial ones, by
-X_j - V × Y_j with one motion X_j. Of a joint with its inner frame at V_P, A_P and its outer frame at V_Q, A_Q
+All vectors are in ground axes about the origin of the ground. A rate j moves its subtree by S_j. In axes that move with
+the subtree, the velocities of all its bodies change by one motion Y_j, and their spatial accelerations A by
+X_j - V × Y_j with one motion X_j. For a joint whose inner frame has the velocity V_P and the acceleration A_P, and
+whose outer frame has V_Q, A_Q,
 
-    by position   Y = V_P × S,  X = A_P × S + V_P × Y       (rotations taken back: V_Q, A_Q in the place of V_P, A_P)
+    by position   Y = V_P × S,  X = A_P × S + V_P × Y       (for reversed rotations V_Q, A_Q instead of V_P, A_P)
     by rate       Y = S,        X = V_P × S + V_Q × S
 
-and of a mode what its markers do (kernels/mode_screws.py), with minus that of its own marker for the body itself. The
-forces of a subtree, seen from itself, then change by I X + N Y, N = [[0, -2 p~], [0, Q]] (p its momentum, force by
-turning), and seen from the ground by S ×* f more. So
+For a mode they are the motions of its markers (kernels/mode_screws.py); for the body itself the motion of its own
+marker counts negative. In axes of the subtree, its force then changes by I X + N Y, N = [[0, -2 p~], [0, Q]] (p:
+momentum); in ground axes also by S ×* f. This leads to the following steps:
 
     (1) S, Y, X of all rates, p, Q, I, f of all subtrees
-    (2) rows      force along rate i by what all above it does:  a_i·X + b_i·Y,  a = I S, b = Nᵀ S; a mode adds its row
-                  of the equations of the body, and the rows of its markers at the subtrees
+    (2) rows      force along rate i due to the motion of all above it: a_i·X + b_i·Y,  a = I S, b = Nᵀ S; a mode adds
+                  its row of the equations of the body, and the rows of its markers at the subtrees
     (3) columns   wrench of all below j: I X + N Y + S ×* f, along the rates above; a mode adds the tangent of its body
-    (4) the body of the modes: rows times columns, and the change of its screws along what hangs at each marker
+    (4) the body of the modes: rows times columns, and the change of its screws along the forces of the subtree at each
+                  marker
 
 Sources: Carpentier & Mansard (2018); Singh, Russell & Wensing (2022) for rigid bodies; derived anew for flexible ones.
 """
