@@ -226,11 +226,11 @@ def job_body(
     Parameters
     ----------
     mesh
-        The solid mesh of the job, from `checked_mesh` for the same job with other numbers; it is not read or checked
-        again.
+        Solid mesh of the job, from `checked_mesh` for the same job with other numerical values; it is not read or
+        checked again.
     ranks
         Processes that assemble a body of a single solid mesh in parts (`fe_models.solid_body`). K and M of other bodies
-        are made here, and then distributed over the ranks.
+        are assembled in this process, and then distributed over the ranks.
     """
     stages = stages or Stages()
     body = uncoupled_body(job, stages, on_report=on_report, mesh=mesh, ranks=ranks)
@@ -351,7 +351,7 @@ def body_of_mesh(
             interfaces=interfaces,
             incompatible_modes=bricks,
             progress=advance,
-            ranks=None if job.ties else ranks,  # tied beams modify K and M, which must then lie on rank 0
+            ranks=None if job.ties else ranks,  # tied beams modify K and M, which must then be on rank 0
         )
         if first_order is not None:
             body = replace(body, provenance={**body.provenance, **first_order.provenance()})

@@ -512,14 +512,14 @@ def read_job(path: str | os.PathLike[str], changes: Mapping[str, Any] | None = N
     Parameters
     ----------
     path
-        The job file.
+        Path of the job file.
     changes
-        Values that replace those in the file: of its parameters by name, of other keys by key path.
+        Values that replace those in the file: parameters by name, other keys by key path.
 
     Raises
     ------
     JobError
-        The message lists every problem with key path, value, expectation, choices and nearest name.
+        If the file is not valid; the message lists every problem with key path, value, expectation and choices.
     """
     path = Path(path)
     job = validated(Job, read_parametric(path, JobError, changes), path, JobError, context=path.parent)

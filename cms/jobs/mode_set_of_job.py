@@ -33,7 +33,7 @@ def job_mode_set(body: FEBody | Families, reduction: ReductionSection) -> ModeSe
     body
         A coupled body, or its `Families`.
     reduction
-        The table.
+        Table of the job.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def job_mode_set(body: FEBody | Families, reduction: ReductionSection) -> ModeSe
 
 
 def reduction_of(job: Job, body: FEBody) -> ReductionSection:
-    """Return the table [reduction]; for a part of a body, its number of modes is limited to what the part can have.
+    """Return the table [reduction]; for a part of a body, its number of modes is limited to the possible number.
 
     The jobs of all parts of a body have the same number of modes, but a small part may have fewer interior dofs. Each
     multiplier of a distributing interface reduces them by one.

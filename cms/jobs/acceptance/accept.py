@@ -80,13 +80,13 @@ def accept_body(
     Parameters
     ----------
     source
-        A body, or its modal file.
+        Body, or its modal file.
     full
-        The full model of the part; None: the file is judged by itself.
+        Full model of the part; None: the file is checked by itself.
     band
-        Highest frequency of interest [Hz]; None: what custom allows the body (its highest mode over 1.5).
+        Highest frequency of interest [Hz]; None: the customary band of the body (its highest mode divided by 1.5).
     most_dofs
-        Largest model that is made to estimate the error of the mesh; 0: no estimate.
+        Largest number of dofs of the refined model for the estimate of the mesh error; 0: no estimate.
 
     Raises
     ------
@@ -179,7 +179,7 @@ def band_record(reduced: ReducedBody, records: tuple[QualityRecord, ...], band: 
 
 
 def band_of(reduced: ReducedBody) -> float:
-    """Return the customary band [Hz], at least slightly above the first free frequency."""
+    """Return the customary band [Hz], raised by 0.1 % if necessary so that it includes the first free frequency."""
     band = 1.001 * custom_band(reduced).highest
     if not band > 0:
         raise QualityError(f"body {reduced.name!r}: has no elastic frequency to compare; give the band yourself")
@@ -271,9 +271,9 @@ def mesh_error(job: Job | None, most_dofs: int, stages: Stages) -> MeshError:
 # job, which is more informative (`check_reduction`). Nodes are paired by their positions in mesh coordinates.
 
 
-SAME_PLACE = 1e-5  #: largest distance between nodes at the same position, over the size of the body
+SAME_PLACE = 1e-5  #: largest distance between nodes at the same position, divided by the size of the body
 LEAST_NODES = 6  #: smallest number of common nodes for a comparison of shapes
-MODES_BEYOND = 1.2  #: upper frequency of the full modes over that of the band
+MODES_BEYOND = 1.2  #: highest frequency of the full modes divided by the band
 
 
 def compare_with_model(body: FEBody, reduced: ReducedBody, *, band: float) -> tuple[QualityRecord, ...]:
@@ -282,14 +282,14 @@ def compare_with_model(body: FEBody, reduced: ReducedBody, *, band: float) -> tu
     Parameters
     ----------
     body
-        The full model, in the units and mesh coordinates of the body.
+        Full model, in the units and mesh coordinates of the reduced body.
     band
         Highest frequency of interest [Hz].
 
     Returns
     -------
     tuple of QualityRecord
-        "model-mass"; and unless it fails, "frequency-error", "mac-nodal" at the nodes in common.
+        Record "model-mass"; unless it fails, also "frequency-error", and "mac-nodal" at the nodes in common.
 
     Raises
     ------

@@ -8,7 +8,7 @@ from fe_models.foundation.digest import file_digest
 
 __all__ = ["GROUPS", "SourceFile", "origin_groups", "source_files"]
 
-#: title -> beginnings of the keys of a provenance; a key goes to the first that takes it
+#: title -> first words of provenance keys; a key belongs to the first title with matching words
 GROUPS: Mapping[str, tuple[str, ...]] = {
     "versions": ("version ",),
     "reduction": ("mode set", "full dofs", "damping", "frame", "job"),
@@ -35,9 +35,9 @@ def origin_groups(provenance: Mapping[str, str]) -> dict[str, dict[str, str]]:
 
 
 def source_files(provenance: Mapping[str, str], folder: Path) -> tuple[SourceFile, ...]:
-    """Return the files with a recorded digest; they are searched at the recorded path, then in a folder.
+    """Return the files with a recorded digest; they are searched for at the recorded path, then in a folder.
 
-    A file is on record as "NAME" with "NAME sha256", or as "file PATH" with its digest.
+    The provenance records a file as "NAME" with "NAME sha256", or as "file PATH" with its digest.
     """
     pairs = [(provenance[key.removesuffix(" sha256")], value) for key, value in provenance.items()
              if key.endswith(" sha256") and key.removesuffix(" sha256") in provenance]  # fmt: skip

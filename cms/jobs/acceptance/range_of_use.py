@@ -1,10 +1,10 @@
 """Range of use of a reduced body: limits of frequency, angular speed, load and deflection.
 
-Band      by custom the highest vibration mode over 1.5 (`custom_band`); against the full model the highest frequency
-          up to which all free frequencies and shapes keep the limits of the quality records
+Band      without full model the customary band, the highest vibration mode / 1.5 (`custom_band`); with a full model the
+          highest frequency up to which all free frequencies and shapes keep the limits of the quality records
 Speed     limit of the frame times the lowest angular frequency with one interface held (docs/multibody.md)
-Loads     a force or moment at an interface, in the balance of the frame: q = K⁻¹ Psiᵀ f. It ends where an interface
-          turns by the limit of the frame, or where the load changes the stiffness by the limit, or nears buckling
+Loads     a force or moment at an interface, balanced by the frame: q = K⁻¹ Psiᵀ f. It is limited by the rotation of an
+          interface, by the change of stiffness due to the load, or by buckling
 """
 
 from collections.abc import Sequence
@@ -115,8 +115,8 @@ def usable_frequencies(reduced: ReducedBody, records: Sequence[QualityRecord]) -
 def custom_band(reduced: ReducedBody) -> UsableBand:
     """Return the customary band from the file alone, never above that of the mode set.
 
-    With n vibration modes the n-th elastic free frequency over 1.5: that of the held body, from which custom takes it,
-    lies higher (constraints raise every frequency).
+    With n vibration modes it is the n-th elastic free frequency divided by 1.5. The customary rule uses the n-th
+    frequency of the held body, which is higher, because constraints raise every frequency.
     """
     free = np.asarray(reduced.free_frequencies) / reduced.units.time
     if not len(free):

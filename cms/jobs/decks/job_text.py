@@ -37,7 +37,7 @@ def job_text(deck: Deck, request: JobRequest, deck_path: str) -> str:
     Parameters
     ----------
     deck
-        The deck.
+        Deck to convert.
     request
         Units, densities, and entries to leave out.
     deck_path
@@ -123,8 +123,8 @@ def materials_in(section: SolidSection | ShellSection | LineSection | RodSection
 def _materials(deck: Deck, request: JobRequest) -> dict[str, Any]:
     """Return the materials in use; the request supplies missing densities.
 
-    Nastran and ANSYS take a missing density as zero. The job does the same if the deck has other masses, such as frames
-    of light beams between point masses. If nothing has mass, the user must give the density.
+    Nastran and ANSYS use zero for a missing density. The job does the same if the deck has other masses, such as point
+    masses on light beams. If nothing has mass, the user must give the density.
     """
     used = dict.fromkeys(name for each in sections_of(deck) for name in materials_in(each))
     for name in request.densities:
