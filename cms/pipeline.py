@@ -21,7 +21,7 @@ from cms.body.reduced_body import ReducedBody
 from cms.errors import MemoryBudgetError
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import Job, read_job
-from cms.jobs.parts_of_job import frame_of
+from cms.jobs.mode_set_of_job import frame_of, job_mode_set, reduction_of
 from cms.linear_algebra.memory.budget import ReductionShape, columns_within, solver_within
 from cms.linear_algebra.memory.size import memory_bytes, resident_bytes
 from cms.linear_algebra.solvers.registry import solver_of
@@ -78,7 +78,6 @@ def reduce_job(
     >>> body = cms.reduce_job("rod.toml")                                          # doctest: +SKIP
     >>> cms.write(body, "rod.h5")                                                  # doctest: +SKIP
     """
-    from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
     from cms.modes.families.families import Families
 
     job = job if isinstance(job, Job) else read_job(Path(job))  # (1)

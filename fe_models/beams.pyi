@@ -3,8 +3,6 @@ from .elements.beams.attachments import PointMass as PointMass
 from .elements.beams.attachments import RigidLink as RigidLink
 from .elements.beams.attachments import Spring as Spring
 from .elements.beams.beam_property import BeamProperty as BeamProperty
-from .elements.beams.interfaces import NodeIndices as NodeIndices
-from .elements.beams.interfaces import line_interface as line_interface
 from .elements.beams.line_law import beam_line as beam_line
 from .elements.beams.links import link_rigidly as link_rigidly
 from .elements.beams.section_points import section_points as section_points
@@ -14,6 +12,8 @@ from .elements.beams.sections import GeneralSection as GeneralSection
 from .elements.beams.sections import ISection as ISection
 from .elements.beams.sections import Rectangle as Rectangle
 from .elements.beams.sections import Tube as Tube
+from .elements.interfaces import NodeIndices as NodeIndices
+from .elements.interfaces import line_interface as line_interface
 from .files.read_mesh import read_line_mesh as read_line_mesh
 from .meshes.line_mesh import LineMesh as LineMesh
 from .meshes.line_mesh import divide_lines as divide_lines

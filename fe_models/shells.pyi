@@ -1,6 +1,6 @@
-from .checks.shell_report import ShellReport as ShellReport
-from .checks.shell_report import report_shell as report_shell
-from .elements.shells.body import shell_interface as shell_interface
+from .checks.thin_reports import ShellReport as ShellReport
+from .checks.thin_reports import report_shell as report_shell
+from .elements.interfaces import shell_interface as shell_interface
 from .elements.shells.normals import orient_normals as orient_normals
 from .elements.shells.shell_points import layer_stress as layer_stress
 from .elements.shells.shell_points import shell_points as shell_points

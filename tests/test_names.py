@@ -52,7 +52,7 @@ cms/exchange/exporters/nodes.py words
 cms/exchange/programs/sid_fem.py words
 cms/jobs/acceptance/acceptance.py words
 cms/jobs/acceptance/range_of_use.py words
-cms/jobs/job.py nearest
+fe_models/assembly/tables/places.py nearest
 cms/jobs/studies/correlation_file.py least
 cms/linear_algebra/sparse_cholesky/front_kernels.py words
 floatframe/analyses/system_matrices.py soft

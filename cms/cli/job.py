@@ -6,8 +6,8 @@ from pathlib import Path
 
 from cms.cli.console import output_path, print_table, say
 from cms.errors import JobError
-from cms.jobs.deck_tables import DECK_MASSES
 from cms.jobs.decks.job_text import JobRequest, job_text
+from fe_models.assembly.model import MASSES_OF_ALL
 from fe_models.foundation.units import UNIT_SYSTEMS
 from fe_models.foundation.words import nearest, quoted
 
@@ -34,8 +34,8 @@ def write_job(request: DeckRequest) -> None:
     if request.units is None or request.units not in UNIT_SYSTEMS:
         what = "missing; a deck does not say its units" if request.units is None else f"unknown {quoted(request.units)}"
         raise JobError(f"--units: {what}{nearest(request.units or '', UNIT_SYSTEMS)}")
-    if request.mass not in (None, *DECK_MASSES):
-        raise JobError(f"--mass: unknown {quoted(request.mass)}{nearest(request.mass, DECK_MASSES)}")
+    if request.mass not in (None, *MASSES_OF_ALL):
+        raise JobError(f"--mass: unknown {quoted(request.mass)}{nearest(request.mass, MASSES_OF_ALL)}")
     path = output_path(request.output, request.deck.with_suffix(".toml"), JobError, overwrite_of=[request.deck])
     deck = read_deck(request.deck, program=request.program)
     asked = JobRequest(request.units, densities_of(request.densities), request.leave_out, request.mass)

@@ -75,8 +75,7 @@ def list_modes(path: Path, *, as_json: bool) -> None:
     """Compute the mode set and the reduced body of a job, and print their contents without writing a file."""
     from cms.jobs.body_of_job import job_body
     from cms.jobs.job import read_job
-    from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
-    from cms.jobs.parts_of_job import frame_of
+    from cms.jobs.mode_set_of_job import frame_of, job_mode_set, reduction_of
     from cms.reduction.reduction import reduce
 
     job = read_job(path)

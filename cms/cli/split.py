@@ -191,37 +191,29 @@ def description_of(found: "PartsDamping", job: Job) -> str:
 
 def mesh_of(job: Job) -> Any:
     """Read the mesh of a job that can be cut: solid cells, shells or lines."""
-    from cms.jobs.attachments_of_job import frame_mesh
-    from cms.jobs.body_of_job import solid_mesh_of
-    from cms.jobs.shell_body import shell_mesh
-    from fe_models.meshes.mesh import drop_unused_nodes
+    from cms.jobs.body_of_job import mesh_of_job
+    from fe_models.meshes.mesh import Mesh, drop_unused_nodes
 
     if job.body.matrices is not None:
         raise JobError("body.matrices: bare matrices cannot be cut; give the mesh they were made of")
     if job.ties:
         raise JobError("ties: beams tied to a solid cannot be cut; cut one without the other")
-    if job.shells:
-        return shell_mesh(job)
-    if job.sections:
-        return frame_mesh(job)
-    return drop_unused_nodes(solid_mesh_of(job))
+    mesh = mesh_of_job(job)
+    return drop_unused_nodes(mesh) if isinstance(mesh, Mesh) else mesh
 
 
 def homes_of(job: Job, mesh: Any, parts: tuple[Any, ...], cuts: list[str]) -> dict[str, int]:
     """Return the part index of each interface; raise `JobError` if an interface is on two parts or on a cut."""
-    from cms.jobs.attachments_of_job import frame_interface
-    from cms.jobs.parts_of_job import interface_of
-    from cms.jobs.shell_body import shell_interface_of
+    from fe_models.assembly.tables.places import interfaces_of
     from fe_models.errors import InterfaceError
 
-    maker: Any = shell_interface_of if job.shells else frame_interface if job.sections else interface_of
     tolerance = COORDINATE * float(np.ptp(mesh.nodes, axis=0).max())
     homes: dict[str, int] = {}
     for name, section in job.interfaces.items():
-        whole = mesh.nodes[maker(name, section, mesh).nodes]
+        whole = mesh.nodes[interfaces_of({name: section}, mesh)[0].nodes]
         for k, part in enumerate(parts):
             try:
-                there = part.nodes[maker(name, section, part).nodes]
+                there = part.nodes[interfaces_of({name: section}, part)[0].nodes]
             except InterfaceError:
                 continue
             if len(there) == len(whole) and np.abs(there - whole).max() <= tolerance:

@@ -1,37 +1,161 @@
-"""Finite element body of a job: reading, checks, assembly, and coupling of the interfaces."""
+"""Finite element body of a job: its model is assembled, and its interfaces are coupled."""
 
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from cms.errors import JobError
-from cms.jobs.attachments_of_job import attachments_of, frame_interface, frame_mesh, one_node, properties_of
 from cms.jobs.job import Job
-from cms.jobs.parts_of_job import interfaces_of, load_cases_of, materials_of, part_of_mesh, selection_of
+from fe_models.assembly.assemble import assemble
+from fe_models.assembly.model import FEModel, ModelTables
+from fe_models.assembly.tables.attachments import one_node
+from fe_models.assembly.tables.beams import PLANES
+from fe_models.assembly.tables.materials import SolidSection
+from fe_models.assembly.tables.places import InterfaceSection, interfaces_of, load_cases_of
 from fe_models.body.couplings.coupling_on_ranks import spread_body
-from fe_models.body.fe_body import FEBody, Interface
+from fe_models.body.fe_body import FEBody
 from fe_models.foundation.ranks.ranks import Ranks
 from fe_models.foundation.stages import Stages
 from fe_models.foundation.units import UNIT_SYSTEMS
+from fe_models.meshes.mesh import Mesh, drop_unused_nodes
 
 if TYPE_CHECKING:
-    from fe_models.checks.first_order import FirstOrderError
-    from fe_models.meshes.mesh import Mesh
-    from fe_models.meshes.node_cloud import NodeCloud
+    from fe_models.meshes.line_mesh import LineMesh
+    from fe_models.meshes.selections import AnyMesh
+    from fe_models.meshes.shell_mesh import ShellMesh
 
 __all__ = [
-    "body_of_frame",
-    "body_of_matrices",
-    "body_of_mixed",
-    "checked_mesh",
-    "coupled_body",
-    "is_of_mesh",
-    "job_body",
-    "solid_mesh_of",
+    "body_of_matrices", "coupled_body", "is_of_mesh", "job_body", "mesh_of_job", "model_of_job", "shell_mesh",
     "uncoupled_body",
-]
+]  # fmt: skip
+
+
+def model_of_job(job: Job, stages: Stages, mesh: "AnyMesh | None" = None) -> FEModel:
+    """Return the model of a job with a mesh or a deck: what is read from the file, and the tables of the job.
+
+    Parameters
+    ----------
+    mesh
+        The solid mesh of the job, where it is known.
+    """
+    name, units, accept = str(job.body.name), UNIT_SYSTEMS[job.body.units], job.body.accept
+    if job.body.deck is not None:
+        from fe_models.files.decks.read_deck import read_deck
+
+        with stages("read deck"):
+            deck = read_deck(job.body.deck, program=job.body.program)
+        return FEModel(
+            name, units, deck.mesh, job, mass=job.body.mass, plane=job.body.plane, accept=accept,
+            lumped=deck.lumped, source=job.body.deck, are_faces_names=deck.is_plain_mesh,
+        )  # fmt: skip
+    if mesh is None:
+        with stages("read mesh" if job.mesh_size is None else "mesh"):
+            mesh = mesh_of_job(job)
+    if not isinstance(mesh, Mesh):
+        return FEModel(name, units, mesh, job, accept=accept)
+    if job.body.incompatible_modes and not len(mesh.cells.get("hexahedron", ())):
+        kinds = ", ".join(mesh.cells)
+        raise JobError(f"body.incompatible_modes: the mesh has no bricks of eight nodes, but {kinds}; remove the key")
+    integration = "incompatible" if job.body.incompatible_modes else "full"
+    solids = {
+        name: SolidSection.model_validate({"cells": material.cells, "material": name, "integration": integration})
+        for name, material in job.materials_of_cells.items()
+    }
+    tables = ModelTables.model_construct(
+        materials=job.materials, solids=solids, interfaces=job.interfaces, load_cases=job.load_cases
+    )
+    return FEModel(name, units, mesh, tables, accept=accept)
+
+
+def mesh_of_job(job: Job) -> "AnyMesh":
+    """Return the mesh of a job with solid cells, shells or lines, or the part of it that the job requests.
+
+    Faces of a CAD file that interfaces and loads select are groups.
+    """
+    from fe_models.files.read_mesh import read_mesh
+
+    if job.shells:
+        mesh: Any = shell_mesh(job)
+    elif job.sections and not job.ties:
+        mesh = frame_mesh(job)
+    elif job.body.mesh is None:
+        raise JobError("job: expected a mesh, got none")
+    elif job.mesh_size is None:
+        mesh = read_mesh(job.body.mesh)
+    else:
+        from fe_models.files.cad.cad_mesh import MeshSize, mesh_cad
+
+        size = MeshSize(**job.mesh_size.model_dump())
+        chosen = [table.faces for table in job.interfaces.values()]
+        chosen += [table.faces for table in job.load_cases.values()]
+        faces = [text for texts in chosen for text in texts or ()]
+        mesh = mesh_cad(job.body.mesh, size, units=job.body.units, faces=faces)
+    if job.body.part is None:
+        return mesh
+    from fe_models.meshes.split import split_mesh
+
+    part = job.body.part
+    return split_mesh(mesh, part.of, at=part.at, axis=part.axis).parts[part.number - 1]
+
+
+def shell_mesh(job: Job) -> "ShellMesh":
+    """Read all triangles and quads of the mesh, and the lines of its stiffeners; `shell_body` checks their thickness.
+
+    If the job accepts that others are left out, only the cells of the groups that it names are read.
+    """
+    from fe_models.files.read_mesh import read_shell_mesh
+
+    groups = [group for shell in job.shells.values() for group in shell.cells]
+    lines = [group for section in job.sections.values() for group in section.lines]
+    is_part = groups != ["all"] and "left-out" in job.body.accept
+    return read_shell_mesh(str(job.body.mesh), groups=groups if is_part else None, stiffeners=lines)
+
+
+def frame_mesh(job: Job) -> "LineMesh":
+    """Read the lines of the job, from two tables or from the mesh groups that have sections."""
+    from fe_models.files.read_mesh import read_line_mesh
+    from fe_models.files.tables import read_tables
+
+    if job.body.nodes is not None and job.body.lines is not None:
+        return read_tables(job.body.nodes, job.body.lines)
+    if job.body.mesh is None:
+        raise JobError("job: expected a mesh, or tables of nodes and lines, got neither")
+    groups = [group for section in job.sections.values() for group in section.lines]
+    return read_line_mesh(job.body.mesh, groups=None if groups == ["all"] else groups)
+
+
+# beams tied to a solid ------------------------------------------------------------------------------------------------
+
+
+def tied_body(job: Job, stages: Stages, on_report: Callable[[Any], None] | None, mesh: Mesh | None) -> FEBody:
+    """Assemble solid and beams of a job, tie the beams to the solid, and put the interfaces on both."""
+    from fe_models.body.couplings.couplings import couple
+    from fe_models.body.weld import weld
+
+    model, lines = model_of_job(job, stages, mesh), frame_mesh(job)
+    of_solid, of_lines = {}, {}
+    for name, tie in job.ties.items():
+        point = tuple(lines.nodes[one_node(lines, f"ties.{name}.node", tie.node)].tolist())
+        of_solid[name] = InterfaceSection.model_validate({**tie.model_dump(exclude={"node"}), "reference": point})
+        of_lines[name] = InterfaceSection.model_validate({"kind": "rigid", "nodes": tie.node})
+    on_solid, on_lines = (
+        tables.model_copy(update={"interfaces": places, "load_cases": {}})
+        for tables, places in ((model.tables, of_solid), (job, of_lines))
+    )
+    beams = FEModel(f"{model.name} beams", model.units, lines, on_lines, accept=model.accept)
+    solid = assemble(replace(model, tables=on_solid), stages=stages, on_report=on_report, is_checked=mesh is not None)
+    frame = assemble(beams, stages=stages, on_report=on_report)
+    with stages("weld"):
+        pairs = [((solid.name, name), (frame.name, name)) for name in job.ties]
+        whole = weld([couple(solid), couple(frame)], pairs, name=model.name)
+    solid_mesh, first_line_node = drop_unused_nodes(model.mesh), len(solid.nodes) + len(of_solid)
+    placed = []
+    for name, section in job.interfaces.items():
+        on, shift = (lines, first_line_node) if section.on == "lines" else (solid_mesh, 0)
+        (interface,) = interfaces_of({name: section}, on)
+        placed.append(replace(interface, nodes=interface.nodes + shift))
+    whole = whole.with_interfaces(*placed)
+    return whole.with_load_cases(*load_cases_of(job.load_cases, whole, solid_mesh))
 
 
 # bodies whose elements are in another program: matrices, their geometry, and interfaces on it -------------------------
@@ -58,14 +182,14 @@ def body_of_matrices(job: Job, stages: Stages, on_report: Callable[[Any], None] 
         read = with_geometry(read, geometry)
         if on_report is not None:
             on_report(MatrixReport(read))
-        interfaces = interfaces_on(job, geometry)
+        interfaces = interfaces_of(job.interfaces, geometry)
     with stages("check matrices"):
         body = body_from_foreign(
             read, geometry, name=str(job.body.name), units=UNIT_SYSTEMS[job.body.units], interfaces=interfaces,
             held=bool(job.body.held), remove_supports=job.body.remove_supports, repair_mass=bool(job.body.repair_mass),
             accept=[word for word in job.body.accept if word == "units"],
         )  # fmt: skip
-    return body.with_load_cases(*load_cases_of(job, body, geometry))
+    return body.with_load_cases(*load_cases_of(job.load_cases, body, geometry))
 
 
 def body_with_its_interfaces(job: Job, stages: Stages) -> FEBody:
@@ -80,134 +204,7 @@ def body_with_its_interfaces(job: Job, stages: Stages) -> FEBody:
             held=bool(job.body.held), repair_mass=bool(job.body.repair_mass),
             accept=[word for word in job.body.accept if word == "units"],
         )  # fmt: skip
-        return body.with_load_cases(*load_cases_of(job, body))
-
-
-def interfaces_on(job: Job, geometry: "Mesh | NodeCloud") -> tuple[Interface, ...]:
-    """Return the interfaces of the job, on a solid mesh or on nodes of elements of another program."""
-    from fe_models.body.couplings.couplings import check_overlap
-    from fe_models.elements.beams.interfaces import node_interface
-    from fe_models.meshes.boundary import facet_weights
-    from fe_models.meshes.mesh import Mesh
-    from fe_models.meshes.selections import selected_facets
-
-    if isinstance(geometry, Mesh):
-        return interfaces_of(job, geometry)
-    interfaces = []
-    for name, section in job.interfaces.items():
-        chosen = selection_of(section)
-        facets = selected_facets(geometry, chosen)
-        weights = facet_weights(geometry.nodes, facets) if facets else np.ones(len(geometry.nodes))
-        # axes are rows in the job, but columns here
-        triad = None if section.triad is None else np.array(section.triad).T
-        interfaces.append(
-            node_interface(geometry, name, chosen, section.kind, section.reference, triad, np.maximum(weights, 0.0))
-        )
-    check_overlap(interfaces, numbers=geometry.node_numbers)
-    return tuple(interfaces)
-
-
-# body of job ----------------------------------------------------------------------------------------------------------
-
-
-# beams of a reduction job: a body of lines, alone or tied to a solid --------------------------------------------------
-
-
-def body_of_frame(
-    job: Job,
-    stages: Stages,
-    on_report: Callable[[Any], None] | None,
-    *,
-    interfaces: tuple[Interface, ...] | None = None,
-) -> FEBody:
-    """Read and check the lines, and return the body with sections and attachments of the job.
-
-    Parameters
-    ----------
-    interfaces
-        Interfaces to use instead of those of the job; load cases are then left to the caller too.
-    """
-    from cms.jobs.parts_of_job import load_cases_of, part_of_mesh
-    from fe_models.checks.frame_report import report_frame
-    from fe_models.elements.beams.body import beam_body
-
-    units = UNIT_SYSTEMS[job.body.units]
-    with stages("read lines"):
-        mesh = frame_mesh(job)
-        if job.body.part is not None:
-            mesh = part_of_mesh(job.body.part, mesh)
-    properties = properties_of(job)
-    masses, springs, links = attachments_of(job, mesh)
-    with stages("check lines"):
-        materials = {item.material: None for item in properties.values()}
-        report = report_frame(mesh, materials, units=units, springs=springs, links=links)
-        if on_report is not None:
-            on_report(report)
-        report.raise_for_errors(accept=job.body.accept)
-        is_whole = interfaces is None
-        if interfaces is None:
-            interfaces = tuple(frame_interface(name, section, mesh) for name, section in job.interfaces.items())
-    with stages("assemble"):
-        body = beam_body(
-            mesh,
-            next(iter(properties.values())) if set(properties) == {"all"} else properties,
-            name=str(job.body.name),
-            units=units,
-            interfaces=interfaces,
-            point_masses=masses,
-            springs=springs,
-            links=links,
-        )
-        return body.with_load_cases(*load_cases_of(job, body, mesh)) if is_whole else body
-
-
-# body of job ----------------------------------------------------------------------------------------------------------
-
-
-# beams of a job that are welded to its solid --------------------------------------------------------------------------
-
-
-def body_of_mixed(job: Job, stages: Stages, solid: FEBody, solid_mesh: Any, on_report: Any) -> FEBody:
-    """Tie the beams of the job to its solid, and put the interfaces on both.
-
-    Parameters
-    ----------
-    solid
-        The solid without interfaces.
-    solid_mesh
-        Mesh of the solid, for selections.
-    """
-    from cms.jobs.parts_of_job import interface_of, selection_of
-    from fe_models.body.couplings.couplings import couple
-    from fe_models.body.weld import weld
-    from fe_models.elements.beams.interfaces import NodeIndices, line_interface
-    from fe_models.elements.solids import interfaces as on_solid
-
-    lines = frame_mesh(job)
-    makers = {"rigid": on_solid.rigid_interface, "distributing": on_solid.distributing_interface}
-    of_solid, of_frame = [], []
-    for name, tie in job.ties.items():
-        node = one_node(lines, f"ties.{name}.node", tie.node)
-        point = lines.nodes[node]
-        of_solid.append(makers[tie.kind](solid_mesh, name, selection_of(tie), reference=point))
-        of_frame.append(line_interface(lines, name, NodeIndices((node,))))
-    frame = body_of_frame(job, stages, on_report, interfaces=tuple(of_frame))
-    frame = replace(frame, name=f"{frame.name} beams")
-    with stages("weld"):
-        whole = weld(
-            [couple(replace(solid, interfaces=tuple(of_solid))), couple(frame)],
-            [((solid.name, name), (frame.name, name)) for name in job.ties],
-            name=str(job.body.name),
-        )
-    first_line_node = len(solid.nodes) + len(of_solid)
-    placed = []
-    for name, section in job.interfaces.items():
-        if section.on == "lines":
-            interface = frame_interface(name, section, lines)
-            placed.append(replace(interface, nodes=interface.nodes + first_line_node))
-        else:
-            placed.append(interface_of(name, section, solid_mesh))
-    return whole.with_interfaces(*placed)
+        return body.with_load_cases(*load_cases_of(job.load_cases, body))
 
 
 # body of job ----------------------------------------------------------------------------------------------------------
@@ -218,7 +215,7 @@ def job_body(
     stages: Stages | None = None,
     *,
     on_report: Callable[[Any], None] | None = None,
-    mesh: "Mesh | None" = None,
+    mesh: Mesh | None = None,
     ranks: Ranks | None = None,
 ) -> FEBody:
     """Process a job up to the coupled body: read, check, assemble, and couple the interfaces.
@@ -226,8 +223,7 @@ def job_body(
     Parameters
     ----------
     mesh
-        Solid mesh of the job, from `checked_mesh` for the same job with other numerical values; it is not read or
-        checked again.
+        Solid mesh of the job without unused nodes, if it is known; it is not read or checked again.
     ranks
         Processes that assemble a body of a single solid mesh in parts (`fe_models.solid_body`). K and M of other bodies
         are assembled in this process, and then distributed over the ranks.
@@ -249,8 +245,7 @@ def coupled_body(job: Job, body: FEBody) -> FEBody:
         body = body.with_load_cases(*centrifugal_loads(body))
     if job.body.plane is None:
         return couple(body)
-    from cms.jobs.beam_tables import PLANES
-    from fe_models.assembly.planar import planar
+    from fe_models.body.elimination import planar
 
     return planar(couple(body), normal=PLANES[job.body.plane])
 
@@ -260,27 +255,20 @@ def uncoupled_body(
     stages: Stages,
     *,
     on_report: Callable[[Any], None] | None = None,
-    mesh: "Mesh | None" = None,
+    mesh: Mesh | None = None,
     ranks: Ranks | None = None,
 ) -> FEBody:
     """Process a job up to the body with uncoupled interfaces, and with the requested nodes and points.
 
     Its source is a deck, a shell, a frame, a solid mesh, or matrices.
     """
-    if job.body.deck is not None:
-        from cms.jobs.deck_body import body_of_deck
-
-        body = body_of_deck(job, job.body.deck, stages, on_report)
-    elif job.shells:
-        from cms.jobs.shell_body import body_of_shell
-
-        body = body_of_shell(job, stages, on_report)
-    elif job.sections and not job.ties:
-        body = body_of_frame(job, stages, on_report)
-    elif job.body.mesh is not None:
-        body = body_of_mesh(job, stages, on_report, mesh, ranks)
-    else:
+    if job.body.matrices is not None:
         body = body_of_matrices(job, stages, on_report)
+    elif job.ties:
+        body = tied_body(job, stages, on_report, mesh)
+    else:
+        model = model_of_job(job, stages, mesh)
+        body = assemble(model, stages=stages, on_report=on_report, is_checked=mesh is not None, ranks=ranks)
     if job.body.keep:
         from fe_models.body.kept_nodes import keep_nodes
 
@@ -298,82 +286,3 @@ def is_of_mesh(job: Job) -> bool:
     """Return whether the body of a job has a solid mesh, possibly with beams tied to it."""
     others = job.body.deck is not None or job.shells or (job.sections and not job.ties)
     return job.body.mesh is not None and not others
-
-
-def checked_mesh(
-    job: Job, stages: Stages, on_report: Callable[[Any], None] | None
-) -> "tuple[Mesh, FirstOrderError | None]":
-    """Read and check the solid mesh of a job; return it without unused nodes, with its first-order error."""
-    from fe_models.checks.mesh_report import report_mesh
-    from fe_models.meshes.mesh import drop_unused_nodes
-
-    with stages("read mesh" if job.mesh_size is None else "mesh"):
-        mesh = solid_mesh_of(job)
-        if job.body.part is not None:
-            mesh = part_of_mesh(job.body.part, mesh)
-    with stages("check mesh"):
-        bricks = job.body.incompatible_modes
-        report = report_mesh(mesh, materials_of(job), units=UNIT_SYSTEMS[job.body.units], incompatible_modes=bricks)
-        if on_report is not None:
-            on_report(report)
-        report.raise_for_errors(accept=job.body.accept)
-        mesh = drop_unused_nodes(mesh)
-        if bricks and not len(mesh.cells.get("hexahedron", ())):
-            kinds = ", ".join(mesh.cells)
-            raise JobError(
-                f"body.incompatible_modes: the mesh has no bricks of eight nodes, but {kinds}; remove the key"
-            )
-    return mesh, report.first_order
-
-
-def body_of_mesh(
-    job: Job,
-    stages: Stages,
-    on_report: Callable[[Any], None] | None,
-    mesh: "Mesh | None" = None,
-    ranks: Ranks | None = None,
-) -> FEBody:
-    """Read and check the mesh unless it is given, and assemble it with materials and interfaces of the job."""
-    from fe_models.elements.solids.body import solid_body
-
-    first_order = None
-    if mesh is None:
-        mesh, first_order = checked_mesh(job, stages, on_report)
-    materials, bricks = materials_of(job), job.body.incompatible_modes
-    interfaces = () if job.ties else interfaces_of(job, mesh)
-    name = str(job.body.name)
-    with stages("assemble") as advance:
-        body = solid_body(
-            mesh,
-            materials,
-            name=name,
-            units=UNIT_SYSTEMS[job.body.units],
-            interfaces=interfaces,
-            incompatible_modes=bricks,
-            progress=advance,
-            ranks=None if job.ties else ranks,  # tied beams modify K and M, which must then be on rank 0
-        )
-        if first_order is not None:
-            body = replace(body, provenance={**body.provenance, **first_order.provenance()})
-    if job.ties:
-        body = body_of_mixed(job, stages, body, mesh, on_report)
-    return body.with_load_cases(*load_cases_of(job, body, mesh)) if job.load_cases else body
-
-
-# the solid mesh of a job, read from a mesh file or made of a CAD file -------------------------------------------------
-
-
-def solid_mesh_of(job: Job) -> "Mesh":
-    """Return the complete solid mesh; faces selected by interfaces and loads are groups."""
-    from fe_models.files.read_mesh import read_mesh
-
-    if job.body.mesh is None:
-        raise JobError("job: expected a mesh, got none")
-    if job.mesh_size is None:
-        return read_mesh(job.body.mesh)
-    from fe_models.files.cad.cad_mesh import MeshSize, mesh_cad
-
-    size = MeshSize(**job.mesh_size.model_dump())
-    chosen = [table.faces for table in job.interfaces.values()] + [table.faces for table in job.load_cases.values()]
-    faces = [text for texts in chosen for text in texts or ()]
-    return mesh_cad(job.body.mesh, size, units=job.body.units, faces=faces)

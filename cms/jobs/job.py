@@ -5,40 +5,19 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, StringConstraints, ValidationInfo, field_validator, model_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from cms.errors import JobError
-from cms.jobs.beam_tables import (
-    PLANES,
-    BeamSection,
-    LinkSection,
-    MassSection,
-    Names,
-    SpringSection,
-    TieSection,
-    check_beams,
-    numbers,
-)
-from cms.jobs.deck_tables import (
-    DECK_MASSES,
-    DECK_PROGRAMS,
-    CouplingSection,
-    EquationSection,
-    RodSection,
-    SolidSection,
-    check_deck,
-)
 from cms.jobs.reduction_table import DampingSection, ReductionSection, mode_set_options, named_interfaces
-from cms.jobs.shell_tables import ShellSection, check_shells
-from cms.jobs.tables.material_table import MaterialSection
 from cms.jobs.tables.recovery_section import RecoverySection
-from fe_models.body.fe_body import INTERFACE_KINDS
-from fe_models.body.load_cases import LOAD_CASE_KINDS
+from fe_models.assembly.model import MASSES_OF_ALL, ModelTables, check_properties
+from fe_models.assembly.tables.attachments import TieSection
+from fe_models.assembly.tables.beams import PLANES, Positive, check_beams
+from fe_models.assembly.tables.materials import MaterialSection, Name
+from fe_models.assembly.tables.shells import check_shells
 from fe_models.files.cad.cad_units import CAD_SUFFIXES
 from fe_models.foundation.parametric_file import read_parametric
 from fe_models.foundation.toml_file import (
-    Matrix3,
-    Range,
     Table,
     Vector3,
     choice,
@@ -51,9 +30,9 @@ from fe_models.foundation.toml_file import (
 from fe_models.foundation.units import UNIT_SYSTEMS
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["SELECTIONS", "DampingSection", "Job", "ReductionSection", "mode_set_options", "read_job"]
+__all__ = ["DECK_PROGRAMS", "DampingSection", "Job", "ReductionSection", "mode_set_options", "read_job"]
 
-SELECTIONS = ("faces", "nodes", "plane", "cylinder", "box", "nearest")  #: keys that select the nodes of an interface
+DECK_PROGRAMS = ("calculix", "abaqus")  #: programs whose decks have the same suffix
 ACCEPTABLE = (
     "left-out",
     "overlap",
@@ -62,26 +41,8 @@ ACCEPTABLE = (
     "units",
     "warped",
 )  #: errors of the mesh report that the user may accept
-KEYS_OF_LOADS = {
-    "pressure": ("pressure",),
-    "gravity": ("acceleration",),
-    "force": ("force", "torque", "at", "reference", "each"),
-}  #: keys of each kind of load case, in addition to the selections for pressure and force
-
-Name = Annotated[str, StringConstraints(min_length=1)]
-Positive = Annotated[float, Field(gt=0)]
-
 
 ROLES = ("K", "M", "D", "dofs")  #: roles of matrix files: stiffness, mass, damping, list of rows
-
-
-def node_names(value: Any) -> Any:
-    """Return the name of a group of nodes, or a list of node numbers as a tuple."""
-    if isinstance(value, list):
-        if not value or any(isinstance(n, bool) or not isinstance(n, int) for n in value):
-            raise ValueError("expected the name of a group of nodes, or a list of node numbers")
-        return tuple(value)
-    return value
 
 
 def accepted(value: Any) -> tuple[str, ...]:
@@ -122,8 +83,6 @@ beside_the_job = existing_file()
 FileOfTheJob = Annotated[Path, BeforeValidator(beside_the_job)]
 Keep = Annotated[tuple[Any, ...], BeforeValidator(nodes_to_keep, json_schema_input_type=Any)]
 StressPoints = Annotated[tuple[Any, ...], BeforeValidator(elements_named, json_schema_input_type=Any)]
-Nodes = Annotated[Name | tuple[int, ...], BeforeValidator(node_names, json_schema_input_type=Any)]
-FACES = "the name of a group of faces, of a CAD file also what they are (cylinder r=12), or a list of these"
 Accepted = Annotated[tuple[str, ...], BeforeValidator(accepted, json_schema_input_type=Any)]
 
 
@@ -177,7 +136,7 @@ class BodySection(Table):
     plane: choice("plane", lambda: tuple(PLANES)) | None = Field(  # type: ignore[valid-type]
         None, description=f"the plane beams or decks deform in, one of {', '.join(PLANES)}; default: space"
     )
-    mass: choice("mass", lambda: DECK_MASSES) | None = Field(  # type: ignore[valid-type]
+    mass: choice("mass", lambda: MASSES_OF_ALL) | None = Field(  # type: ignore[valid-type]
         None,
         description="for a deck: consistent, lumped, or as the deck, of all elements; default: solids by their tables "
         "(as the deck), others consistent",
@@ -289,132 +248,13 @@ def check_mesh_size(table: MeshSizeSection | None, mesh: Path | None, *, has_oth
         )
 
 
-class PlaneSection(Table):
-    """Nodes on a plane."""
-
-    point: Vector3 = Field(description="a point of the plane, [x, y, z]")
-    normal: Vector3 = Field(description="a direction normal to the plane, [x, y, z]")
-    tolerance: Positive | None = Field(None, description="a number above 0, the largest distance of a node")
-
-
-class CylinderSection(Table):
-    """Nodes on the surface of a cylinder."""
-
-    point: Vector3 = Field(description="a point on the axis, [x, y, z]")
-    axis: Vector3 = Field(description="the direction of the axis, [x, y, z]")
-    radius: Positive = Field(description="a number above 0, the radius")
-    span: Range | None = Field(None, description="two numbers, [from, to] along the axis, measured from point")
-    tolerance: Positive | None = Field(None, description="a number above 0, the largest distance from the surface")
-
-
-class BoxSection(Table):
-    """Nodes in a box whose edges are parallel to the mesh axes."""
-
-    lo: Vector3 = Field(description="the corner with the least coordinates, [x, y, z]")
-    hi: Vector3 = Field(description="the corner with the greatest coordinates, [x, y, z]")
-
-
-class NearestSection(Table):
-    """The node nearest to a point."""
-
-    point: Vector3 = Field(description="a point, [x, y, z]")
-
-
-class InterfaceSection(Table):
-    """[interfaces.NAME]: a place at which neighbours connect to the body."""
-
-    kind: choice("kind", lambda: INTERFACE_KINDS) = Field(  # type: ignore[valid-type]
-        description=f"one of {', '.join(INTERFACE_KINDS)}"
-    )
-    faces: Names | None = Field(None, description=FACES)
-    nodes: Nodes | None = Field(None, description="the name of a group of nodes, or a list of node numbers")
-    plane: PlaneSection | None = Field(None, description="a table {point, normal, tolerance}")
-    cylinder: CylinderSection | None = Field(None, description="a table {point, axis, radius, span, tolerance}")
-    box: BoxSection | None = Field(None, description="a table {lo, hi}")
-    nearest: NearestSection | None = Field(None, description="a table {point}")
-    reference: Vector3 | None = Field(None, description="the reference point, [x, y, z]")
-    triad: Matrix3 | None = Field(None, description="the axes of the interface, [x axis, y axis, z axis]")
-    on: choice("part", lambda: ("solid", "lines")) | None = Field(  # type: ignore[valid-type]
-        None, description="solid or lines: the part on which it is, if a body has both"
-    )
-
-    @model_validator(mode="after")
-    def _one_selection(self) -> "InterfaceSection":
-        given = [key for key in SELECTIONS if getattr(self, key) is not None]
-        if len(given) != 1:
-            raise ValueError(f"expected exactly one of {', '.join(SELECTIONS)}; got {', '.join(given) or 'none'}")
-        return self
-
-
-class LoadCaseSection(Table):
-    """[load_cases.NAME]: a named load, whose modal forces and stresses go into the modal file."""
-
-    kind: choice("kind", lambda: LOAD_CASE_KINDS) = Field(  # type: ignore[valid-type]
-        description=f"one of {', '.join(LOAD_CASE_KINDS)}"
-    )
-    pressure: float | None = Field(None, description="a number, positive pushes on the surface [stress unit]")
-    acceleration: Vector3 | None = Field(None, description="the acceleration of free fall, [x, y, z]")
-    force: Vector3 | None = Field(None, description="the total force, [x, y, z]")
-    torque: Vector3 | None = Field(None, description="the total torque about the reference point, [x, y, z]")
-    at: Name | None = Field(None, description="the name of an interface, at whose reference point it acts")
-    each: dict[str, numbers(6)] | None = Field(  # type: ignore[valid-type]
-        None, description="with a deck: a table {group = [force and moment at each of its nodes]}"
-    )
-    reference: Vector3 | None = Field(None, description="the point the force acts at, [x, y, z]")
-    faces: Names | None = Field(None, description=FACES)
-    nodes: Nodes | None = Field(None, description="the name of a group of nodes, or a list of node numbers")
-    plane: PlaneSection | None = Field(None, description="a table {point, normal, tolerance}")
-    cylinder: CylinderSection | None = Field(None, description="a table {point, axis, radius, span, tolerance}")
-    box: BoxSection | None = Field(None, description="a table {lo, hi}")
-    nearest: NearestSection | None = Field(None, description="a table {point}")
-
-    @property
-    def selection(self) -> str | None:
-        """Key of the given selection; None if there is none."""
-        return next((key for key in SELECTIONS if getattr(self, key) is not None), None)
-
-    @model_validator(mode="after")
-    def _keys_of_the_kind(self) -> "LoadCaseSection":
-        allowed = KEYS_OF_LOADS[self.kind] + (() if self.kind == "gravity" else SELECTIONS)
-        given = [key for key in type(self).model_fields if key != "kind" and getattr(self, key) is not None]
-        for key in given:
-            if key not in allowed:
-                raise ValueError(f"a load case of kind {self.kind!r} has no key {key}{nearest(key, allowed)}")
-        if self.each is not None:
-            if given != ["each"]:
-                raise ValueError("each: says place and amount; remove the other keys")
-            return self
-        places = [key for key in given if key in (*SELECTIONS, "at")]
-        if self.kind != "gravity" and len(places) != 1:
-            choices = ", ".join(("at", *SELECTIONS) if self.kind == "force" else SELECTIONS)
-            raise ValueError(f"expected exactly one of {choices}; got {', '.join(places) or 'none'}")
-        amounts = ("force", "torque") if self.kind == "force" else KEYS_OF_LOADS[self.kind]
-        if not any(key in given for key in amounts):
-            raise ValueError(f"{' or '.join(amounts)}: missing; how large is the load?")
-        if self.at is not None and self.reference is not None:
-            raise ValueError("reference: an interface has its own; remove the key, or select the nodes instead of at")
-        return self
-
-
-class Job(Table):
+class Job(ModelTables):
     """A reduction job: one body, its materials, its interfaces, and how to reduce it."""
 
     kind: str = kind_field("job")
     body: BodySection = Field(description="a table [body] with mesh and units")
-    materials: dict[str, MaterialSection] = Field({}, description="tables [materials.NAME]")
     mesh_size: MeshSizeSection | None = Field(None, description="a table [mesh_size] with size, for CAD files")
-    shells: dict[str, ShellSection] = Field({}, description="tables [shells.NAME]")
-    sections: dict[str, BeamSection] = Field({}, description="tables [sections.NAME] of beams")
-    masses: dict[str, MassSection] = Field({}, description="tables [masses.NAME]")
-    springs: dict[str, SpringSection] = Field({}, description="tables [springs.NAME]")
-    links: dict[str, LinkSection] = Field({}, description="tables [links.NAME]")
     ties: dict[str, TieSection] = Field({}, description="tables [ties.NAME] of beams to a solid")
-    solids: dict[str, SolidSection] = Field({}, description="tables [solids.NAME] of a deck")
-    rods: dict[str, RodSection] = Field({}, description="tables [rods.NAME] of a deck")
-    couplings: dict[str, CouplingSection] = Field({}, description="tables [couplings.NAME] of a deck")
-    equations: dict[str, EquationSection] = Field({}, description="tables [equations.NAME] of a deck")
-    interfaces: dict[str, InterfaceSection] = Field({}, description="tables [interfaces.NAME]")
-    load_cases: dict[str, LoadCaseSection] = Field({}, description="tables [load_cases.NAME]")
     recovery: dict[str, RecoverySection] = Field({}, description="tables [recovery.NAME] with rows")
     reduction: ReductionSection = Field(description="a table [reduction] with set and n_modes or cutoff")
     damping: DampingSection | None = Field(
@@ -440,7 +280,9 @@ class Job(Table):
         if self.mesh_size is not None or (self.body.mesh and self.body.mesh.suffix.lower() in CAD_SUFFIXES):
             check_mesh_size(self.mesh_size, self.body.mesh, has_others=bool(self.shells or self.sections))
         if self.body.deck:
-            check_deck(self)
+            if self.ties or self.body.part or self.body.incompatible_modes:
+                raise ValueError("body.deck: ties, part and incompatible_modes belong to a mesh; remove them")
+            check_properties(self)
             return self._names_of_interfaces()
         for key in ("mass", "program"):
             if getattr(self.body, key) is not None:

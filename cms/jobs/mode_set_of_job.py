@@ -1,11 +1,12 @@
-"""Mode set that a job requests, with its options as function arguments."""
+"""Mode set, body frame and options of a reduction that a job requests, as function arguments."""
 
 import logging
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cms.errors import JobError
 from cms.jobs.job import Job
 from cms.jobs.reduction_table import AUTO, LoadSection, NeighbourSection, ReductionSection, mode_set_options
 from cms.linear_algebra.solvers.mode_count import ModeCount
@@ -18,7 +19,11 @@ from cms.modes.mode_sets.extra_columns import EXTRA_COLUMNS
 from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.foundation.arrays import Array
 
-__all__ = ["job_mode_set", "reduction_of"]
+if TYPE_CHECKING:
+    from cms.assessment.quality.of_reduction.contents import ReductionOptions
+    from cms.reduction.basis.frames import Frame, HeldFrame
+
+__all__ = ["frame_of", "job_mode_set", "reduction_of", "reduction_options"]
 
 log = logging.getLogger(__name__)
 
@@ -123,7 +128,6 @@ def load_of(name: str, section: LoadSection) -> InterfaceLoad:
 
 def neighbour_load(body: FEBody, section: NeighbourSection) -> InterfaceLoad:
     """Build the body of the neighbour's job, and condense it to the shared interfaces."""
-    from cms.errors import JobError
     from cms.jobs.body_of_job import job_body
     from cms.jobs.job import read_job
 
@@ -142,3 +146,46 @@ def _matrix(translation: tuple[tuple[float, ...], ...] | None, rotation: tuple[f
         return np.array(translation)
     first = (0.0, 0.0, 0.0) if translation is None else translation[0]
     return np.diag([*first, *(rotation or (0.0, 0.0, 0.0))])
+
+
+# body frame and other options of the reduction ------------------------------------------------------------------------
+
+
+def frame_of(job: Job, *, held: bool = False) -> "Frame | HeldFrame":
+    """Return the body frame of the job; for a fixed body, only the ground is allowed."""
+    from cms.reduction.basis.frames import FRAMES, HeldFrame, NodalFrame
+
+    reduction = job.reduction
+    if held:
+        if "frame" in reduction.model_fields_set:
+            raise JobError(
+                f'reduction.frame = "{reduction.frame}": body {job.body.name!r} is held to the ground, as it was '
+                "said; its frame is the ground: remove frame"
+            )
+        return HeldFrame(reduction.origin, reduction.axes)
+    if reduction.frame == "nodal":
+        return NodalFrame(reduction.at, reduction.origin, reduction.axes, reduction.dofs)
+    return FRAMES[reduction.frame](origin=reduction.origin, axes=reduction.axes)
+
+
+def reduction_options(job: Job, body: FEBody) -> "ReductionOptions":
+    """Return the options that determine the expected content of the modal file.
+
+    Parameters
+    ----------
+    body
+        The coupled body of the job.
+    """
+    from cms.assessment.quality.of_reduction.contents import ReductionOptions
+    from cms.jobs.tables.recovery_section import requests_of
+
+    asked = job.reduction.geometric_stiffness
+    is_made = asked is True or bool(job.reduction.quadratic_modes)
+    return ReductionOptions(
+        damping=None if job.damping is None else job.damping.damping,
+        frame=frame_of(job, held=body.is_held),
+        stress=job.reduction.stress is not False,
+        geometric=tuple(asked) if isinstance(asked, list) else is_made,
+        quadratic=bool(job.reduction.quadratic_modes),
+        recovery=requests_of(job.recovery),
+    )

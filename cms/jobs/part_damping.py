@@ -33,7 +33,7 @@ import numpy as np
 import scipy.linalg as la
 
 from cms.modes.families.families import Families
-from cms.reduction.basis.node_motion import reference_motion
+from cms.reduction.basis.node_results import reference_motion
 from cms.reduction.basis.strain_damping import StrainDamping
 from fe_models.body.fe_body import MULTIPLIER, FEBody, Interface
 from fe_models.body.rigid_motion import rigid_motion_of_dofs

@@ -35,7 +35,7 @@ from cms.reduction.basis.frames import (
     determinate_rows,
     placed,
 )
-from cms.reduction.basis.stress_modes import turned_stress
+from cms.reduction.basis.node_results import turned_stress
 from cms.reduction.geometric_stiffness.geometric_conversion import converted_geometric_stiffness, require_convertible
 from fe_models.body.load_cases import ReducedLoadCase
 from fe_models.body.rigid_motion import rigid_motion_of_points

@@ -23,15 +23,16 @@ from cms.reduction.basis.damping import Damping, modal_damping
 from cms.reduction.basis.finishing import FinishedBasis, finish
 from cms.reduction.basis.frames import Frame, FrameCondition, HeldFrame, TisserandFrame, frame_condition
 from cms.reduction.basis.matrix_moments import gram_from_matrices
-from cms.reduction.basis.node_motion import (
+from cms.reduction.basis.node_results import (
     kept_points,
+    nodal_stress_modes,
     node_weights,
+    point_stress_modes,
     reference_motion,
     translation_rows,
     weighted_rigid_modes,
 )
 from cms.reduction.basis.strain_damping import StrainDamping
-from cms.reduction.basis.stress_modes import nodal_stress_modes, point_stress_modes
 from cms.reduction.geometric_stiffness.geometric_reduction import stiffness_of_states
 from cms.reduction.geometric_stiffness.quadratic_modes import quadratic_modes
 from cms.reduction.geometric_stiffness.unit_states import (

@@ -128,7 +128,7 @@ def join(
     node_sets
         Sets of these nodes.
     normal
-        Axis normal to the plane of a body that becomes planar (`fe_models.assembly.planar`). The first node with six
+        Axis normal to the plane of a body that becomes planar (`fe_models.body.elimination`). The first node with six
         dofs then keeps its rotations out of the plane, even without mass and stiffness: the body follows them rigidly.
 
     Raises

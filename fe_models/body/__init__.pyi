@@ -1,5 +1,5 @@
+from fe_models.elements.interfaces import nodes_interface as nodes_interface
 from fe_models.elements.recovery.element_points import element_points as element_points
-from fe_models.elements.solids.interfaces import nodes_interface as nodes_interface
 
 from .couplings.couplings import check_overlap as check_overlap
 from .kept_nodes import keep_nodes as keep_nodes

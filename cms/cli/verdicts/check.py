@@ -45,8 +45,7 @@ def check_against(reduced: ReducedBody, path: Path, band: float | None) -> tuple
     from cms.cli.console import stages
     from cms.jobs.body_of_job import coupled_body, uncoupled_body
     from cms.jobs.job import read_job
-    from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
-    from cms.jobs.parts_of_job import reduction_options
+    from cms.jobs.mode_set_of_job import job_mode_set, reduction_of, reduction_options
     from cms.modes.families.families import Families
 
     job = read_job(path)

@@ -18,7 +18,7 @@ from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
 from cms.linear_algebra.solvers.eigen import orientation
 from cms.reduction.basis.damping import modal_damping
 from cms.reduction.basis.frames import TisserandFrame
-from cms.reduction.basis.node_motion import are_spread, mean_translation
+from cms.reduction.basis.node_results import are_spread, mean_translation
 from cms.reduction.frame_conversion import convert_frame
 from fe_models.body.couplings.couplings import mean_motion
 from fe_models.body.load_cases import ReducedLoadCase

@@ -53,7 +53,7 @@ def stress_fields(body: ReducedBody, k: int, q: float) -> dict[str, Array]:
     """Return stress tensor (mesh axes, order of VTK) and von Mises stress at the nodes, if the body has stress."""
     if body.stress is None:
         return {}
-    from cms.reduction.basis.stress_modes import turned_stress
+    from cms.reduction.basis.node_results import turned_stress
 
     stress = q * turned_stress(np.asarray(body.stress)[:, :, k : k + 1], body.frame.axes.T)[:, :, 0]
     return {"stress": stress[:, STRESS_ORDER], "von Mises stress": von_mises(stress)}

@@ -28,26 +28,25 @@ from cms.errors import CmsError
 from cms.jobs.acceptance.acceptance import Acceptance, LeftOut, MeshError, now
 from cms.jobs.acceptance.origin import source_files
 from cms.jobs.acceptance.range_of_use import custom_band, range_of_use
-from cms.jobs.body_of_job import coupled_body, solid_mesh_of, uncoupled_body
+from cms.jobs.body_of_job import coupled_body, model_of_job, uncoupled_body
 from cms.jobs.decks.job_text import JobRequest, job_text
 from cms.jobs.job import Job, read_job
-from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
-from cms.jobs.parts_of_job import materials_of, part_of_mesh, reduction_options
+from cms.jobs.mode_set_of_job import job_mode_set, reduction_of, reduction_options
 from cms.jobs.studies.mesh_convergence import mesh_convergence
 from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.modes.families.families import Families
+from fe_models.assembly.tables.materials import solid_properties
 from fe_models.body.fe_body import FEBody
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.errors import FeModelsError
 from fe_models.files.decks.read_deck import read_deck
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.stages import Stages
-from fe_models.foundation.units import UNIT_SYSTEMS, unit_system
+from fe_models.foundation.units import UNIT_SYSTEMS
 from fe_models.foundation.words import quoted
 from fe_models.meshes.mesh import drop_unused_nodes
 
 if TYPE_CHECKING:
-    from fe_models.body.fe_body import FEBody
     from fe_models.files.decks.deck import Deck
 
 __all__ = ["MODES_BEYOND", "FullModel", "accept_body", "compare_with_model"]
@@ -247,11 +246,12 @@ def mesh_error(job: Job | None, most_dofs: int, stages: Stages) -> MeshError:
             )
         if job.body.mesh is None or job.shells or job.sections or job.ties:
             return MeshError("not estimated: only bodies of one solid mesh are refined; compare two meshes of your own")
-        mesh = solid_mesh_of(job) if job.body.part is None else part_of_mesh(job.body.part, solid_mesh_of(job))
+        model = model_of_job(job, Stages())
+        (of_group,) = solid_properties(model.tables.solids, model.tables.materials).values()
         refined = mesh_refinement(
-            drop_unused_nodes(mesh),
-            materials_of(job),
-            units=unit_system(job.body.units),
+            drop_unused_nodes(model.mesh),
+            of_group.get("all", of_group),
+            units=model.units,
             incompatible_modes=job.body.incompatible_modes,
             most_dofs=most_dofs,
             stages=stages,

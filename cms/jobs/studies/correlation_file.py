@@ -17,15 +17,16 @@ from cms.assessment.correlation.points import TOLERANCE, Placement
 from cms.assessment.correlation.universal_file import read_universal
 from cms.assessment.correlation.update import MODES_BEYOND, Parameter, Update, update_model
 from cms.body.modal_file.file import read
-from cms.jobs.body_of_job import checked_mesh, is_of_mesh, job_body
+from cms.jobs.body_of_job import is_of_mesh, job_body, model_of_job
 from cms.jobs.job import Job
+from fe_models.assembly.assemble import assemble
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.parametric_file import read_parametric
 from fe_models.foundation.stages import Stages
 from fe_models.foundation.toml_file import PathBeside, Table, Vector3, kind_field, read_toml, validated, value_of
 from fe_models.foundation.units import Units, unit_system
-from fe_models.meshes.mesh import Mesh
+from fe_models.meshes.mesh import Mesh, drop_unused_nodes
 
 __all__ = ["CorrelationFile", "CorrelationResult", "read_correlation", "run_correlation"]
 
@@ -202,7 +203,9 @@ def body_maker(path: Path, parameters: tuple[Parameter, ...]) -> Callable[[Array
             document = read_parametric(path, CorrelationError, given)
             job = named(validated(Job, document, path, CorrelationError, context=path.parent), path)
             if is_of_mesh(job) and not is_of_body and not meshes:
-                meshes.append(checked_mesh(job, Stages(), None)[0])
+                model = model_of_job(job, Stages())
+                assemble(model)  # checks the mesh
+                meshes.append(drop_unused_nodes(model.mesh))
             made[key] = job_body(job, mesh=meshes[0] if meshes else None)
         return made[key]
 

@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from cms.body.reduced_body import BodyFrame
 from cms.errors import BodyError
 from cms.linear_algebra.lu_factors import solve_factored
-from cms.reduction.basis.node_motion import node_weights, weighted_rigid_modes
+from cms.reduction.basis.node_results import node_weights, weighted_rigid_modes
 from fe_models.body.fe_body import FEBody
 from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.foundation.arrays import MOTION_COMPONENTS, Array, IntArray

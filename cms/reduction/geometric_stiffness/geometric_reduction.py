@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from cms.body.geometric_stiffness import GeometricStiffness, stiffness_of_loads
 from cms.modes.families.families import Families, body_of
 from cms.reduction.basis.frames import FrameCondition
-from cms.reduction.basis.node_motion import reference_motion, translation_rows
+from cms.reduction.basis.node_results import reference_motion, translation_rows
 from cms.reduction.geometric_stiffness.unit_states import UnitStates, turned_rigid_work, unit_states
 from fe_models.body.couplings.couplings import mean_motion
 from fe_models.body.fe_body import FEBody, Interface

@@ -12,7 +12,7 @@ import numpy as np
 from cms.errors import BodyError
 from cms.modes.families.families import Families, body_of, families_of
 from cms.reduction.basis.frames import FrameCondition
-from cms.reduction.basis.node_motion import translation_rows
+from cms.reduction.basis.node_results import translation_rows
 from cms.reduction.geometric_stiffness.geometric_reduction import distributing_part, elastic_part, link_work
 from cms.reduction.geometric_stiffness.unit_states import balanced, require_geometric_stiffness, together
 from fe_models.body.fe_body import FEBody

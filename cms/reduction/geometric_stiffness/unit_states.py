@@ -19,7 +19,7 @@ from cms.errors import BodyError
 from cms.modes.families.families import Families, body_of, families_of
 from cms.modes.families.fixed_interface import held_factor
 from cms.reduction.basis.frames import Frame, FrameCondition, HeldFrame, TisserandFrame, frame_condition
-from cms.reduction.basis.node_motion import node_weights, reference_motion, weighted_rigid_modes
+from cms.reduction.basis.node_results import node_weights, reference_motion, weighted_rigid_modes
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.rigid_motion import MassLoads, rigid_motion_of_dofs
 from fe_models.foundation.arrays import Array, IntArray

@@ -6,7 +6,7 @@ from cms.body.address import Address
 from cms.body.recovery_table import N_RIGID, spin_accelerations
 from cms.body.reduced_body import ReducedBody
 from cms.errors import BodyError, RecoveryError
-from cms.reduction.basis.stress_modes import turned_stress
+from cms.reduction.basis.node_results import turned_stress
 from cms.reduction.frame_conversion import six_motions
 from cms.reduction.recovery.blocks import RowName
 from cms.reduction.recovery.interface_rows import PartOfTable

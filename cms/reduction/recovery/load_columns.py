@@ -14,7 +14,7 @@ from cms.body.geometric_stiffness import SPIN_PAIRS
 from cms.body.recovery_table import N_RIGID
 from cms.body.reduced_body import BodyFrame, ReducedBody
 from cms.errors import RecoveryError
-from cms.reduction.basis.node_motion import reference_motion
+from cms.reduction.basis.node_results import reference_motion
 from cms.reduction.frame_conversion import rigid_mass, six_motions
 from cms.reduction.geometric_stiffness.unit_states import has_geometric_stiffness, unit_mass_loads
 from cms.reduction.interface_model import free_matrices

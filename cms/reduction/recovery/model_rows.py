@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from cms.errors import RecoveryError
-from cms.reduction.basis.node_motion import reference_motion
+from cms.reduction.basis.node_results import reference_motion
 from cms.reduction.recovery.blocks import Block, RowName
 from cms.reduction.recovery.places import Places
 from cms.reduction.recovery.request import OF_ELEMENTS, OF_MOTION, Rows, motion_dimensions

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from fe_models.body.fe_body import FEBody, Interface, Recovery
 from fe_models.body.material import material_words
@@ -14,7 +14,6 @@ from fe_models.body.unit_check import warn_of_materials
 from fe_models.elements.beams.attachments import PointMass, RigidLink, Spring
 from fe_models.elements.beams.beam_property import BeamProperty
 from fe_models.elements.beams.body import assembled, beam_body, skin_rows
-from fe_models.elements.beams.interfaces import node_interface
 from fe_models.elements.beams.links import link_rigidly
 from fe_models.elements.shells.elements import ShellCells, shell_cells
 from fe_models.elements.shells.model import ShellModel
@@ -26,19 +25,17 @@ from fe_models.elements.shells.shell_property import (
     StiffnessProperty,
     assign_shell_properties,
 )
-from fe_models.elements.shells.skin import ShellSkin, cell_edges, make_shell_skin
+from fe_models.elements.shells.skin import ShellSkin, make_shell_skin
 from fe_models.elements.shells.stiffeners import element_model_of, with_frame
 from fe_models.errors import ShellError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.units import Units
-from fe_models.meshes.boundary import facet_weights
 from fe_models.meshes.line_mesh import LineMesh
 from fe_models.meshes.mesh_numbering import shell_numbering
 from fe_models.meshes.objects.as_mesh import as_shell_mesh
-from fe_models.meshes.selections import Selection, selected_facets
 from fe_models.meshes.shell_mesh import ShellMesh
 
-__all__ = ["shell_body", "shell_interface"]
+__all__ = ["shell_body"]
 
 
 def shell_body(
@@ -246,60 +243,3 @@ def _provenance(mesh: ShellMesh, used: tuple[AnyShellProperty, ...], of_cell: Ma
                 f"along direction {list(item.direction)}: {item.stiffness!r}, shear {item.shear_stiffness!r}"
             )
     return {key: value for key, value in record.items() if value}
-
-
-# interfaces of a shell: rigid, distributing, or with the dofs of every node -------------------------------------------
-
-
-def shell_interface(
-    mesh: Any,
-    name: str,
-    selection: Selection,
-    *,
-    kind: str = "rigid",
-    reference: ArrayLike | None = None,
-    triad: ArrayLike | None = None,
-) -> Interface:
-    """Return an interface at nodes of a shell, which have rotations.
-
-    Parameters
-    ----------
-    mesh
-        Mesh of the shell.
-    name
-        Name of the interface.
-    selection
-        Selected nodes: `NodeSet("v0")` for the nodes of an edge, `FaceGroup("lug")` for those of a group of cells, or a
-        selection by geometry.
-    kind
-        "rigid": the nodes move rigidly with the reference node; one node is enough. "distributing": the reference node
-        follows the mean motion of the nodes, weighted with the area of the cells whose nodes are all selected, or else
-        with the length of the edges; this needs three nodes that are not collinear. "nodes": every dof of every node is
-        a boundary dof.
-    reference
-        Reference point, (3,) [m]; None: the mean of the nodes.
-    triad
-        Axes of the interface as columns in mesh axes, (3, 3); None: the mesh axes.
-
-    Raises
-    ------
-    InterfaceError
-        If no node is selected, or `reference` or `triad` is invalid.
-    """
-    mesh = as_shell_mesh(mesh)
-    weights = _weights(mesh, selection) if kind == "distributing" else np.ones(len(mesh.nodes))
-    return node_interface(mesh, name, selection, kind, reference, triad, weights)
-
-
-def _weights(mesh: ShellMesh, selection: Selection) -> Array:
-    """Return weights of the nodes, (n_nodes,): area of the selected cells, or length of the selected edges, or one."""
-    facets = selected_facets(mesh, selection)
-    if facets:
-        return facet_weights(mesh.nodes, facets)
-    chosen = np.zeros(len(mesh.nodes), dtype=bool)
-    chosen[selection.members(mesh)] = True
-    edges = np.unique(np.sort(cell_edges(tuple(mesh.cells.values())).nodes, axis=1), axis=0)
-    edges = edges[chosen[edges].all(axis=1)]
-    weights = np.zeros(len(mesh.nodes))
-    np.add.at(weights, edges, np.linalg.norm(mesh.nodes[edges[:, 1]] - mesh.nodes[edges[:, 0]], axis=1)[:, None] / 2)
-    return weights if weights[chosen].all() else np.ones(len(mesh.nodes))

@@ -24,8 +24,7 @@ from cms.body.reduced_body import ReducedBody
 from cms.cli.split import SplitRequest, split_job
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import Job, read_job
-from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
-from cms.jobs.parts_of_job import frame_of
+from cms.jobs.mode_set_of_job import frame_of, job_mode_set, reduction_of
 from cms.modes.families.families import Families
 from cms.pipeline import Plan, reduced, states_of_job
 from cms.reduction.geometric_stiffness.unit_states import UnitStates, require_geometric_stiffness

@@ -8,9 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 
 import cms
-from cms.jobs.body_of_job import job_body
+from cms.jobs.body_of_job import job_body, shell_mesh
 from cms.jobs.job import read_job
-from cms.jobs.shell_body import shell_mesh
 from cms.modes.families.families import Families
 from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.damping import RayleighDamping

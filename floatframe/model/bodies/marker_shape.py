@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cms.body.reduced_body import ReducedBody
-from cms.reduction.basis.node_motion import are_spread
+from cms.reduction.basis.node_results import are_spread
 from fe_models.body.couplings.couplings import mean_motion
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.records import frozen_copies

@@ -11,7 +11,7 @@ from cms import NodalFrame, craig_bampton, reduce
 from cms.body import Address
 from cms.errors import BodyError
 from cms.reduction import BuckensFrame
-from cms.reduction.basis.node_motion import kept_points
+from cms.reduction.basis.node_results import kept_points
 from cms.reduction.frame_conversion import convert_frame, six_motions
 from fe_models.body.couplings.couplings import couple
 from fe_models.body.fe_body import Interface
@@ -19,8 +19,8 @@ from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.elements.beams.attachments import PointMass
 from fe_models.elements.beams.beam_property import BeamProperty
 from fe_models.elements.beams.body import beam_body
-from fe_models.elements.beams.interfaces import NodeIndices, line_interface
 from fe_models.elements.beams.sections import Rectangle
+from fe_models.elements.interfaces import NodeIndices, line_interface
 from fe_models.elements.solids.body import solid_body
 from fe_models.foundation.units import unit_system
 from fe_models.meshes.line_mesh import straight_line

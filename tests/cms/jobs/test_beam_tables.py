@@ -3,11 +3,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from cms.cli.split import SplitRequest, split_job
-from cms.errors import JobError, ModeSetError
-from cms.jobs.beam_tables import SHAPE_KEYS, BeamSection, LinkSection, MassSection, SpringSection, TieSection
+from cms.errors import BodyError, JobError, ModeSetError
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
 from cms.pipeline import reduce_job
+from fe_models.assembly.tables.attachments import LinkSection, MassSection, SpringSection, TieSection
+from fe_models.assembly.tables.beams import SHAPE_KEYS, BeamSection
 from fe_models.elements.beams.sections import SECTIONS
 from tests.root import ROOT
 
@@ -114,7 +115,7 @@ def test_a_mass_sits_at_the_node_of_its_number(job_file):
     by_name = job_body(read_job(path)).M
     by_number = job_body(read_job(job_file(ROD.replace('node = "tip"', f"node = {100 - 7 * N}", 1)))).M
     assert abs(by_number - by_name).max() == 0
-    with pytest.raises(JobError, match=r"masses\.bob\.node = 6: in the mesh 0 nodes have this number"):
+    with pytest.raises(BodyError, match=r"masses\.bob\.node = 6: in the mesh 0 nodes have this number"):
         job_body(read_job(job_file(ROD.replace('node = "tip"', "node = 6", 1))))
 
 
@@ -268,7 +269,7 @@ def test_a_bad_job_of_beams_is_refused(job_file, old, new, words):
         (
             'node = "tip"',
             'node = "top"',
-            'masses.bob.node = "top": the lines have no such group of nodes; did you mean',
+            'masses.bob.node = "top": the mesh has no such group of nodes; did you mean',
         ),
         ('node = "tip"', 'node = "rod"', "expected a group of one node, got 7"),
         ('nodes = ["pivot", "housing"]', 'nodes = ["pivot", "tip"]', "2 parts that no line, link or spring joins"),

@@ -5,20 +5,12 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from cms.errors import JobError
-from cms.jobs.job import (
-    BodySection,
-    DampingSection,
-    InterfaceSection,
-    Job,
-    LoadCaseSection,
-    MaterialSection,
-    ReductionSection,
-    read_job,
-)
-from cms.jobs.mode_set_of_job import load_of
-from cms.jobs.parts_of_job import frame_of
+from cms.jobs.job import BodySection, DampingSection, Job, ReductionSection, read_job
+from cms.jobs.mode_set_of_job import frame_of, load_of
 from cms.reduction.basis.damping import ModalDamping, PerModeDamping, RampDamping, RayleighDamping
 from cms.reduction.basis.frames import BuckensFrame, NodalFrame
+from fe_models.assembly.tables.materials import MaterialSection
+from fe_models.assembly.tables.places import InterfaceSection, LoadCaseSection
 from tests.root import ROOT
 
 DOCUMENT = ROOT / "docs" / "job_file.md"

@@ -12,7 +12,8 @@ from numpy.testing import assert_allclose
 import cms
 import fe_models
 from cms.errors import JobError
-from cms.jobs.body_of_job import interfaces_on, job_body, uncoupled_body
+from cms.jobs.body_of_job import job_body, uncoupled_body
+from fe_models.assembly.tables.places import InterfaceSection, interfaces_of
 from fe_models.errors import FeModelsError
 from fe_models.foundation.stages import Stages
 
@@ -170,17 +171,16 @@ def test_matrices_that_bring_their_nodes_need_no_geometry(tmp_path):
     assert_allclose(reduced.interfaces[0].position, ours.interfaces[0].position, rtol=0, atol=1e-9)
 
 
-def test_distributing_interfaces_and_faces_on_a_geometry_of_shells(tmp_path, folder):
+def test_distributing_interfaces_and_faces_on_a_geometry_of_shells():
     """A deck of shells is a cloud of nodes with face groups: their area weighs a distributing interface."""
     geometry = fe_models.meshes.NodeCloud(
         np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0], [4, 0, 0], [4, 1, 0]], dtype=float),
         face_sets={"web": {"quad": np.array([[0, 1, 2, 3], [1, 4, 5, 2]])}, "left": {"quad": np.array([[0, 1, 2, 3]])}},
         node_numbers=np.arange(1, 7),
     )
-    job = cms.jobs.job.read_job(job_in(folder))
     table = {"kind": "distributing", "faces": "web"}
-    interfaces = {"web": cms.jobs.job.InterfaceSection.model_validate(table)}
-    (web,) = interfaces_on(job.model_copy(update={"interfaces": interfaces}), geometry)
+    interfaces = {"web": InterfaceSection.model_validate(table)}
+    (web,) = interfaces_of(interfaces, geometry)
     assert_allclose(web.weights, np.array([1, 2, 2, 1, 1, 1]) / 8, rtol=1e-12, atol=0)
     assert fe_models.selections.FaceGroup("left").members(geometry).tolist() == [0, 1, 2, 3]
     with pytest.raises(FeModelsError, match="no face group 'right'"):

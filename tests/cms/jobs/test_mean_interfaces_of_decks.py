@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import cms
-from cms.errors import JobError
+from cms.errors import BodyError
 from cms.jobs.decks.job_text import JobRequest, job_text
 from fe_models.body.fe_body import Interface
 from fe_models.elements.solids.body import solid_body
@@ -56,12 +56,12 @@ def test_the_reference_node_is_the_distributing_interface_of_the_members(tmp_pat
 
 def test_what_sits_on_the_node_too_is_refused(tmp_path):
     job = job_of(tmp_path, deck("*ELEMENT, TYPE=MASS, ELSET=lump", "99, 901", "*MASS, ELSET=lump", "2.0"))
-    with pytest.raises(JobError, match=r"interfaces.REF: its node is the reference of coupling 'C1', and masses\."):
+    with pytest.raises(BodyError, match=r"interfaces.REF: its node is the reference of coupling 'C1', and masses\."):
         cms.reduce_job(job)
 
 
 def test_a_coupling_of_some_components_is_refused(tmp_path):
     job = job_of(tmp_path, deck())
     job.write_text(job.read_text().replace("members =", 'components = ["ux", "uy", "uz"]\nmembers ='))
-    with pytest.raises(JobError, match="takes some components only"):
+    with pytest.raises(BodyError, match="takes some components only"):
         cms.reduce_job(job)

@@ -6,14 +6,13 @@ from numpy.testing import assert_allclose
 
 from cms.cli.split import SplitRequest, split_job
 from cms.errors import JobError
-from cms.jobs.body_of_job import job_body
+from cms.jobs.body_of_job import job_body, shell_mesh
 from cms.jobs.job import read_job
-from cms.jobs.shell_body import shell_mesh, shell_properties_of
-from cms.jobs.shell_tables import ShellSection
-from cms.jobs.tables.material_table import material_of
 from cms.pipeline import reduce_job
+from fe_models.assembly.tables.materials import material_of
+from fe_models.assembly.tables.shells import ShellSection, shell_properties
 from fe_models.elements.shells.shell_property import LaminateProperty, Layer
-from fe_models.errors import FeModelsError
+from fe_models.errors import FeModelsError, MaterialError
 from tests.root import ROOT
 
 DOCUMENT = ROOT / "docs" / "job_file.md"
@@ -220,7 +219,7 @@ def test_a_job_of_layers_makes_the_laminate(job_file):
     body = job_body(job)
     ply, steel = (material_of(name, job.materials[name]) for name in ("ply", "steel"))
     lower = (Layer(ply, 0.002, 45.0), Layer(steel, 0.003))
-    made = shell_properties_of(job)["floor"]
+    made = shell_properties(job.shells, job.materials)["floor"]
     assert made == LaminateProperty((*lower, *lower[::-1]), (1, 1, 0), offset=0.005)
     assert body.provenance["layers 1"].endswith(
         "ply 0.002 at 45.0, steel 0.003 at 0.0, steel 0.003 at 0.0, ply 0.002 at 45.0"
@@ -258,7 +257,7 @@ def test_a_bad_job_of_layers_is_refused(job_file, old, new, words):
 
 def test_an_orthotropic_material_belongs_to_layers(job_file):
     text = LAYUP.replace('material = "tin"', 'material = "ply"')
-    with pytest.raises(JobError, match=r"ply: it is not isotropic; shells of one thickness \(not of layers\)"):
+    with pytest.raises(MaterialError, match=r"ply: it is not isotropic; shells of one thickness \(not of layers\)"):
         job_body(read_job(job_file(text)))
 
 

@@ -32,8 +32,8 @@ from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.damping import Damping, damping_of_words, modal_damping
 from cms.reduction.basis.finishing import SUSPECT_ENERGY, FinishedBasis
 from cms.reduction.basis.frames import Frame, FrameCondition, HeldFrame, frame_condition
+from cms.reduction.basis.node_results import nodal_stress_modes, point_stress_modes
 from cms.reduction.basis.strain_damping import StrainDamping
-from cms.reduction.basis.stress_modes import nodal_stress_modes, point_stress_modes
 from cms.reduction.geometric_stiffness.geometric_reduction import stiffness_of_states
 from cms.reduction.geometric_stiffness.quadratic_modes import force_stiffness
 from cms.reduction.geometric_stiffness.unit_states import has_geometric_stiffness, unit_states

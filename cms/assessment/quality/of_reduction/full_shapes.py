@@ -21,7 +21,7 @@ from cms.errors import BodyError, ModeSetError
 from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.finishing import FinishedBasis, finish
 from cms.reduction.basis.frames import FRAMES, Axes, Frame, HeldFrame, NodalFrame, frame_condition
-from cms.reduction.basis.node_motion import kept_points
+from cms.reduction.basis.node_results import kept_points
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, frozen
 

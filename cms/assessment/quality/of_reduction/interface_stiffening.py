@@ -8,7 +8,7 @@ from cms.assessment.quality.errors import QualityError
 from cms.assessment.quality.record import QualityRecord, judge
 from cms.assessment.quality.reference.ports import Ports
 from cms.modes.families.families import Families
-from cms.reduction.basis.node_motion import are_spread
+from cms.reduction.basis.node_results import are_spread
 from fe_models.body.couplings.couplings import couple
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.arrays import Array, frozen

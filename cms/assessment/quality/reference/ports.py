@@ -7,7 +7,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from cms.assessment.quality.errors import QualityError
-from cms.reduction.basis.node_motion import interface_node_motion
+from cms.reduction.basis.node_results import interface_node_motion
 from fe_models.body.couplings.couplings import mean_motion
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.arrays import MOTION_COMPONENTS, Array

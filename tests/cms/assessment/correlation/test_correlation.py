@@ -329,8 +329,8 @@ def test_file_command_page_and_updated_job(folder, specimen, rows, tmp_path, cap
     write(tmp_path / "modes.unv", text)
     file = write(tmp_path / "t.toml", FILE)
     updated = tmp_path / "updated.toml"
-    reads, read_mesh = [], body_of_job.solid_mesh_of
-    monkeypatch.setattr(body_of_job, "solid_mesh_of", lambda job: reads.append(job) or read_mesh(job))
+    reads, read_mesh = [], body_of_job.mesh_of_job
+    monkeypatch.setattr(body_of_job, "mesh_of_job", lambda job: reads.append(job) or read_mesh(job))
     assert run(monkeypatch, ["correlate", str(file), "--updated-job", str(updated)]) == 0
     assert len(reads) == 1  # whatever the number of values
     assert "materials.steel.young" in capsys.readouterr().out

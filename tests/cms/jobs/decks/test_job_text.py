@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 import cms
 from cms.cli.app import app
-from cms.errors import JobError
+from cms.errors import BodyError, JobError
 from cms.jobs.body_of_job import job_body, uncoupled_body
 from cms.jobs.decks.job_text import JobRequest, job_text
 from cms.jobs.job import read_job
@@ -78,7 +78,7 @@ def test_a_mass_of_a_deck_names_its_node_by_number(tmp_path):
         M[node] = uncoupled_body(read_job(toml), Stages()).M
     assert_array_equal(M["7"].toarray(), M['"tip"'].toarray())
     toml.write_text(plain + "\n[masses.bob]\nnode = 901\nmass = 5.0\n")
-    with pytest.raises(JobError, match=r"masses\.bob\.node = 901: the deck has 0 nodes with this number"):
+    with pytest.raises(BodyError, match=r"masses\.bob\.node = 901: in the mesh 0 nodes have this number"):
         uncoupled_body(read_job(toml), Stages())
 
 
@@ -104,10 +104,10 @@ def test_cells_of_a_deck_in_no_table_are_refused(tmp_path):
     job_of(path)
     toml = path.with_suffix(".toml")
     toml.write_text(toml.read_text().replace('cells = "all"', 'cells = "left half"'))
-    with pytest.raises(JobError, match="2 hexahedron20 cells are in no table"):
+    with pytest.raises(BodyError, match="2 hexahedron20 cells are in no table"):
         uncoupled_body(read_job(toml), Stages())
     toml.write_text(toml.read_text().replace('"left half"', '"left haf"'))
-    with pytest.raises(JobError, match="the deck has no such group of cells; did you mean 'left half'"):
+    with pytest.raises(BodyError, match="the mesh has no such group of cells; did you mean 'left half'"):
         uncoupled_body(read_job(toml), Stages())
 
 

@@ -3,7 +3,7 @@
 import pytest
 from numpy.testing import assert_allclose
 
-from cms.errors import JobError
+from cms.errors import BodyError, JobError
 from cms.jobs.body_of_job import uncoupled_body
 from cms.jobs.decks.job_text import JobRequest, job_text
 from cms.jobs.job import read_job
@@ -79,5 +79,5 @@ def test_a_job_of_its_own_tables_reads_a_plain_mesh_as_mesh_and_as_deck(path):
     deck = body_of(path, "deck", '[solids.bar]\ncells = "whole"\n')
     assert_allclose(deck.K.toarray(), plain.K.toarray(), rtol=0, atol=1e-12 * abs(plain.K).max())
     path.write_text(path.read_text() + "*MATERIAL, NAME=M\n")  # a whole deck: its shells and rods may have mass
-    with pytest.raises(JobError, match="1 line cells are in no table"):
+    with pytest.raises(BodyError, match="1 line cells are in no table"):
         body_of(path, "deck", '[solids.bar]\ncells = "whole"\n')

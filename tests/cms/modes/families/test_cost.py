@@ -11,8 +11,8 @@ from cms.errors import BodyError
 from cms.modes.families import cost
 from cms.modes.families.cost import stiffness_bytes
 from cms.reduction.geometric_stiffness.unit_states import unit_states
+from fe_models.elements.interfaces import nodes_interface, rigid_interface
 from fe_models.elements.solids.body import solid_body
-from fe_models.elements.solids.interfaces import nodes_interface, rigid_interface
 from fe_models.meshes.selections import NodeSet
 from tests.bodies import STEEL, box_mesh
 

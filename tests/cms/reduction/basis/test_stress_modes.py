@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from cms.body.stress import von_mises
 from cms.modes.mode_sets import craig_bampton, guyan
 from cms.reduction.basis.frames import NodalFrame, TisserandFrame
-from cms.reduction.basis.stress_modes import turned_stress
+from cms.reduction.basis.node_results import turned_stress
 from cms.reduction.frame_conversion import convert_frame
 from cms.reduction.reduction import reduce
 from fe_models.body.couplings.couplings import couple

@@ -9,8 +9,8 @@ from fe_models.body.weld import weld
 from fe_models.elements.beams.attachments import PointMass, RigidLink
 from fe_models.elements.beams.beam_property import BeamProperty
 from fe_models.elements.beams.body import beam_body
-from fe_models.elements.beams.interfaces import NodeIndices, line_interface
 from fe_models.elements.beams.sections import Rectangle
+from fe_models.elements.interfaces import NodeIndices, line_interface
 from fe_models.foundation.units import unit_system
 from fe_models.meshes.line_mesh import straight_line
 from tests.bodies import STEEL, bar, with_interfaces

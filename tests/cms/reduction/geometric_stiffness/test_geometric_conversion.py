@@ -16,8 +16,8 @@ from fe_models.body.weld import weld
 from fe_models.elements.beams.attachments import PointMass, RigidLink
 from fe_models.elements.beams.beam_property import BeamProperty
 from fe_models.elements.beams.body import beam_body
-from fe_models.elements.beams.interfaces import NodeIndices, line_interface
 from fe_models.elements.beams.sections import Rectangle
+from fe_models.elements.interfaces import NodeIndices, line_interface
 from fe_models.meshes.line_mesh import LineMesh
 from fe_models.meshes.numbering import Numbering
 from tests.bodies import STEEL, bar, with_interfaces

@@ -10,17 +10,17 @@ from numpy.testing import assert_allclose, assert_array_equal
 import cms
 from cms.errors import BodyError, ModeSetError
 from cms.reduction.basis.frames import BuckensFrame, NodalFrame, TisserandFrame, frame_condition
-from cms.reduction.basis.node_motion import reference_motion
+from cms.reduction.basis.node_results import reference_motion
 from cms.reduction.geometric_stiffness.geometric_reduction import reduced_geometric_stiffness
 from cms.reduction.geometric_stiffness.unit_states import balanced, unit_loads, unit_states
-from fe_models.assembly.planar import planar
+from fe_models.body.elimination import planar
 from fe_models.body.material import Material
 from fe_models.body.rigid_motion import MassLoads, rigid_motion_of_dofs
 from fe_models.elements.beams.attachments import PointMass
 from fe_models.elements.beams.beam_property import BeamProperty
 from fe_models.elements.beams.body import beam_body
-from fe_models.elements.beams.interfaces import NodeIndices, line_interface
 from fe_models.elements.beams.sections import Rectangle
+from fe_models.elements.interfaces import NodeIndices, line_interface
 from fe_models.meshes.line_mesh import LineMesh, straight_line
 from tests.bodies import STEEL, bar
 from tests.cms.reduction.geometric_stiffness.examples import SECTION, SI, bar_of_beams, some_bodies

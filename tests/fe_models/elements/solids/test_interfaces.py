@@ -4,7 +4,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from fe_models.body.couplings.couplings import check_overlap
 from fe_models.body.fe_body import Interface
-from fe_models.elements.solids.interfaces import distributing_interface, nodes_interface, rigid_interface
+from fe_models.elements.interfaces import distributing_interface, nodes_interface, rigid_interface
 from fe_models.errors import InterfaceError
 from fe_models.meshes.cell_shapes import CELL_SHAPES
 from fe_models.meshes.mesh import Mesh, drop_unused_nodes

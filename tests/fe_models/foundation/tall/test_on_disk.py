@@ -7,8 +7,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 import cms
 from cms.linear_algebra.memory.size import resident_bytes
 from cms.modes.families.families import Families
+from fe_models.elements.interfaces import nodes_interface, rigid_interface
 from fe_models.elements.solids.body import solid_body
-from fe_models.elements.solids.interfaces import nodes_interface, rigid_interface
 from fe_models.foundation.errors import StorageError
 from fe_models.foundation.tall import on_disk as room
 from fe_models.foundation.tall.columns import beside, combine, combined, copied, dots, in_memory, inner, subtract

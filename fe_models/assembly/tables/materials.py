@@ -1,18 +1,24 @@
-"""The tables [materials.NAME] of a reduction job: isotropic and orthotropic materials (docs/job_file.md)."""
+"""The tables [materials.NAME] and [solids.NAME] of a model: materials, and the cells of solids (docs/job_file.md)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, StringConstraints, model_validator
 
-from cms.errors import JobError
-from fe_models.foundation.toml_file import Matrix3, Names, Table, is_no_number
+from fe_models.elements.solids.elements import INTEGRATIONS, MASSES
+from fe_models.errors import MaterialError
+from fe_models.foundation.toml_file import Matrix3, Names, Table, choice, is_no_number
+from fe_models.foundation.words import nearest
 
 if TYPE_CHECKING:
     from fe_models.body.material import AnyMaterial, Material
 
-__all__ = ["MaterialSection", "isotropic_of", "material_of"]
+__all__ = [
+    "MaterialSection", "Name", "SolidSection", "check_material", "isotropic_of", "material_of",
+    "solid_properties",
+]  # fmt: skip
 
+Name = Annotated[str, StringConstraints(min_length=1)]
 Three = tuple[float, float, float]
 Tensor = tuple[tuple[float, ...], ...]
 
@@ -113,19 +119,71 @@ def material_of(name: str, table: MaterialSection) -> "AnyMaterial":
     return Material(name, E=table.young, nu=table.poisson, rho=table.density)
 
 
-def isotropic_of(name: str, table: MaterialSection, what: str) -> "Material":
-    """Return the isotropic material of a table; `what` names the elements that need it, for the message.
+def isotropic_of(section: Any, materials: Mapping[str, MaterialSection], what: str) -> "Material":
+    """Return the isotropic material that a section names, or the only one.
+
+    Parameters
+    ----------
+    section
+        A table with the key `material`.
+    materials
+        The tables of the materials.
+    what
+        The elements that need it, for the message.
 
     Raises
     ------
-    JobError
+    MaterialError
         If the material is not isotropic.
     """
     from fe_models.body.material import Material
 
-    made = material_of(name, table)
+    name = section.material or next(iter(materials))
+    made = material_of(name, materials[name])
     if not isinstance(made, Material):
-        raise JobError(
+        raise MaterialError(
             f"materials.{name}: it is not isotropic; {what} take isotropic materials only: young = one number"
         )
     return made
+
+
+def check_material(where: str, material: str | None, materials: Mapping[str, Any]) -> None:
+    """Raise `ValueError` unless a section names a material that exists, or there is only one."""
+    if material is None and len(materials) != 1:
+        raise ValueError(f"{where}.material: missing; there are {len(materials)} materials, name one")
+    if material is not None and material not in materials:
+        raise ValueError(f'{where}.material = "{material}": there is no such material{nearest(material, materials)}')
+
+
+class SolidSection(Table):
+    """[solids.NAME]: material and formulation of a group of solid cells."""
+
+    cells: Names = Field(("all",), description='"all", the name of a group of cells, or a list of names')
+    material: Name | None = Field(None, description="the name of a material; default: the only one")
+    integration: choice("integration", lambda: (*INTEGRATIONS, "incompatible")) = Field(  # type: ignore[valid-type]
+        "full", description=f"of the stiffness, one of {', '.join((*INTEGRATIONS, 'incompatible'))}"
+    )
+    mass: choice("mass", lambda: MASSES) = Field(  # type: ignore[valid-type]
+        "consistent", description=f"one of {', '.join(MASSES)}"
+    )
+
+
+def solid_properties(
+    solids: Mapping[str, SolidSection], materials: Mapping[str, MaterialSection], mass_of_all: str | None = None
+) -> "dict[tuple[str, str], dict[str, AnyMaterial]]":
+    """Return the material of each group of solid cells, by integration and kind of mass.
+
+    Parameters
+    ----------
+    mass_of_all
+        "lumped" for all solids, or "consistent" for those that a table would lump; others: by the tables.
+    """
+    made = {name: material_of(name, each) for name, each in materials.items()}
+    rules: dict[tuple[str, str], dict[str, AnyMaterial]] = {}
+    for table in solids.values():
+        mass = table.mass
+        if mass_of_all == "lumped" or (mass_of_all == "consistent" and mass == "lumped"):
+            mass = mass_of_all
+        of_group = dict.fromkeys(table.cells, made[table.material or next(iter(made))])
+        rules.setdefault((table.integration, mass), {}).update(of_group)
+    return rules

@@ -1,15 +1,23 @@
-"""The tables of a reduction job that describe beams and attachments at their nodes (docs/job_file.md)."""
+"""The tables [sections.NAME] and [rods.NAME] of a model, and the beams and rods they describe (docs/job_file.md)."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import BeforeValidator, Field, StringConstraints, model_validator
+import numpy as np
+from pydantic import BeforeValidator, Field, model_validator
 
-from fe_models.foundation.arrays import MOTION_COMPONENTS as COMPONENTS
-from fe_models.foundation.toml_file import Matrix3, Names, Table, Vector3, choice, names
-from fe_models.foundation.words import nearest, quoted
+from fe_models.assembly.tables.materials import MaterialSection, Name, check_material, isotropic_of
+from fe_models.foundation.toml_file import Names, Table, Vector3, choice
+from fe_models.foundation.words import nearest
 
-__all__ = ["PLANES", "SHAPE_KEYS", "BeamSection", "LinkSection", "MassSection", "SpringSection", "TieSection"]
+if TYPE_CHECKING:
+    from fe_models.assembly.rods import Rod
+    from fe_models.elements.beams.beam_property import BeamProperty
+
+__all__ = [
+    "PLANES", "SHAPE_KEYS", "BeamSection", "RodSection", "beam_properties", "check_beams", "numbers",
+    "rod_properties",
+]  # fmt: skip
 
 PLANES = {"yz": 0, "zx": 1, "xz": 1, "xy": 2}  #: index of the mesh axis normal to each plane
 SHAPE_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
@@ -21,10 +29,16 @@ SHAPE_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "general": (("area", "iy", "iz", "torsion"), ("shear_area_y", "shear_area_z", "shear_center", "outline")),
 }  #: required and optional keys of each shape
 
-Name = Annotated[str, StringConstraints(min_length=1)]
-NodeNumber = Annotated[int, Field(ge=0, strict=True)]
 Positive = Annotated[float, Field(gt=0)]
 Pair = tuple[float, float]
+GENERAL_KEYS = {
+    "area": "A",
+    "iy": "Iy",
+    "iz": "Iz",
+    "torsion": "J",
+    "shear_area_y": "A_sy",
+    "shear_area_z": "A_sz",
+}  #: field of `GeneralSection` for each key of a table
 
 
 def numbers(*counts: int) -> Any:
@@ -39,30 +53,12 @@ def numbers(*counts: int) -> Any:
     return Annotated[tuple[float, ...], BeforeValidator(check)]
 
 
-def component_numbers(value: Any) -> tuple[int, ...]:
-    """Return component names as numbers 0-5."""
-    words = names(value)
-    for word in words:
-        if word not in COMPONENTS:
-            raise ValueError(f"unknown component {quoted(word)}{nearest(word, COMPONENTS)}")
-    return tuple(COMPONENTS.index(word) for word in words)
-
-
 def polygon(value: Any) -> tuple[Pair, ...]:
     """Return a list of at least three points (y, z)."""
     is_list = isinstance(value, list | tuple) and len(value) >= 3
     if not is_list or not all(isinstance(p, list | tuple) and len(p) == 2 for p in value):
         raise ValueError("expected three or more points [[y, z], ...]")
     return tuple((float(y), float(z)) for y, z in value)
-
-
-def inertia_numbers(value: Any) -> Any:
-    """Return one number, three numbers, or three rows of three."""
-    rows = value if isinstance(value, list | tuple) else [value]
-    flat = [x for row in rows for x in (row if isinstance(row, list | tuple) else [row])]
-    if len(flat) not in (1, 3, 9) or not all(isinstance(x, int | float) and not isinstance(x, bool) for x in flat):
-        raise ValueError("expected one number, three principal values, or three rows of three")
-    return value
 
 
 class BeamSection(Table):
@@ -118,58 +114,12 @@ class BeamSection(Table):
         return {key: getattr(self, key) for key in keys if getattr(self, key) is not None}
 
 
-class MassSection(Table):
-    """[masses.NAME]: a rigid piece at a node."""
+class RodSection(Table):
+    """[rods.NAME]: lines with axial force only (trusses)."""
 
-    node: Name | NodeNumber = Field(description="the name of a group that holds one node, or a node number")
-    mass: Annotated[float, Field(ge=0)] = Field(description="a number, 0 or more")
-    inertia: Annotated[Any, BeforeValidator(inertia_numbers, json_schema_input_type=Any)] = Field(
-        0.0, description="about the centre of mass: one number, three principal values, or three rows of three"
-    )
-    offset: Vector3 | None = Field(None, description="from the node to the centre of mass, [x, y, z]")
-
-
-class SpringSection(Table):
-    """[springs.NAME]: a spring between two nodes."""
-
-    nodes: Annotated[Names, Field(min_length=2, max_length=2)] = Field(
-        description="two names of groups that hold one node each"
-    )
-    stiffness: numbers(6) = Field(  # type: ignore[valid-type]
-        description="six numbers: along x y z, about x y z"
-    )
-    damping: numbers(6) | None = Field(  # type: ignore[valid-type]
-        None, description="six numbers: along x y z, about x y z"
-    )
-    point: Vector3 | None = Field(None, description="where it acts, [x, y, z]; default: midway")
-    triad: Matrix3 | None = Field(None, description="its axes, [x axis, y axis, z axis]")
-
-
-class LinkSection(Table):
-    """[links.NAME]: nodes that move rigidly with one node."""
-
-    node: Name = Field(description="the name of a group that holds one node, which leads")
-    followers: Names = Field(description="the name of a group of nodes, or a list of names")
-    components: Annotated[tuple[int, ...], BeforeValidator(component_numbers, json_schema_input_type=Any)] = Field(
-        tuple(range(6)), description="with a deck: components that follow, ux to rz; default: all"
-    )
-
-
-class TieSection(Table):
-    """[ties.NAME]: a node of the beams held by nodes of the solid."""
-
-    node: Name = Field(description="the name of a group that holds one node of the beams")
-    kind: choice("kind", lambda: ("rigid", "distributing")) = Field(  # type: ignore[valid-type]
-        description="one of rigid, distributing"
-    )
-    faces: Name | None = Field(None, description="the name of a group of faces of the solid")
-    nodes: Name | None = Field(None, description="the name of a group of nodes of the solid")
-
-    @model_validator(mode="after")
-    def _one_selection(self) -> "TieSection":
-        if (self.faces is None) == (self.nodes is None):
-            raise ValueError(f"expected either faces or nodes of the solid, got {'both' if self.faces else 'neither'}")
-        return self
+    lines: Names = Field(description="the name of a group of lines, or a list of names")
+    material: Name | None = Field(None, description="the name of a material; default: the only one")
+    area: Annotated[float, Field(gt=0)] = Field(description="a number above 0 [length^2]")
 
 
 ON_SOLIDS = {
@@ -187,14 +137,49 @@ def check_beams(sections: Mapping[str, BeamSection], others: Mapping[str, Any], 
                 f"{kind}: belong to beams; {ON_SOLIDS.get(kind, 'add tables [sections.NAME], or remove them')}"
             )
     for name, section in sections.items():
-        if section.material is None and len(materials) != 1:
-            raise ValueError(f"sections.{name}.material: missing; there are {len(materials)} materials, name one")
-        if section.material is not None and section.material not in materials:
-            raise ValueError(
-                f'sections.{name}.material = "{section.material}": there is no such material'
-                f"{nearest(section.material, materials)}"
-            )
+        check_material(f"sections.{name}", section.material, materials)
         if section.lines == ("all",) and len(sections) > 1:
             raise ValueError(
                 f'sections.{name}: lines = "all", but there are {len(sections)} sections; name the lines of each'
             )
+
+
+def beam_properties(
+    sections: Mapping[str, BeamSection], materials: Mapping[str, MaterialSection]
+) -> "dict[str, BeamProperty]":
+    """Return section, material and beam theory for each group of lines."""
+    from fe_models.elements.beams.beam_property import BeamProperty
+
+    made: dict[str, BeamProperty] = {}
+    for section in sections.values():
+        item = BeamProperty(
+            shape_of(section),
+            isotropic_of(section, materials, "beams"),
+            offset=section.offset or (0.0, 0.0),
+            orientation=section.orientation,
+            shear=section.shear,
+            rotary_inertia=section.rotary_inertia,
+            added_mass=section.added_mass,
+        )
+        made |= dict.fromkeys(section.lines, item)
+    return made
+
+
+def rod_properties(tables: Mapping[str, RodSection], materials: Mapping[str, MaterialSection]) -> "dict[str, Rod]":
+    """Return material and area of the rods for each group of lines."""
+    from fe_models.assembly.rods import Rod
+
+    made: dict[str, Rod] = {}
+    for table in tables.values():
+        made |= dict.fromkeys(table.lines, Rod(isotropic_of(table, materials, "rods"), table.area))
+    return made
+
+
+def shape_of(section: BeamSection) -> Any:
+    """Return the cross-section of a table."""
+    from fe_models.elements.beams.sections import SECTIONS
+
+    given = {GENERAL_KEYS.get(key, key): value for key, value in section.dimensions.items()}
+    if "outline" in given:
+        given["outline"] = np.array(given["outline"])
+    return SECTIONS[section.shape](**given)

@@ -1,17 +1,24 @@
-"""The tables of a reduction job that describe shells (docs/job_file.md)."""
+"""The tables [shells.NAME] of a model, and the thickness, layers or stiffness they describe (docs/job_file.md)."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import Field, StringConstraints
+from pydantic import Field
 
-from cms.jobs.beam_tables import BeamSection
+from fe_models.assembly.tables.beams import BeamSection
+from fe_models.assembly.tables.materials import (
+    MaterialSection,
+    Name,
+    check_material,
+    isotropic_of,
+    material_of,
+)
 from fe_models.foundation.toml_file import Names, Table, Vector3
-from fe_models.foundation.words import nearest
 
-__all__ = ["LayerTable", "ShellSection", "check_layups", "check_shells"]
+if TYPE_CHECKING:
+    from fe_models.elements.shells.shell_property import AnyShellProperty
 
-Name = Annotated[str, StringConstraints(min_length=1)]
+__all__ = ["LayerTable", "ShellSection", "check_layups", "check_shells", "shell_properties"]
 
 
 class LayerTable(Table):
@@ -97,7 +104,7 @@ def check_layups(shells: Mapping[str, ShellSection], materials: Mapping[str, Any
                     raise ValueError(f"{where}.{key}: belongs to layers; remove it, or give layers")
             if shell.thickness is None:
                 raise ValueError(f"{where}.thickness: missing; expected a number above 0, or layers")
-            _check_material(where, shell.material, materials)
+            check_material(where, shell.material, materials)
             continue
         for key in ("thickness", "material"):
             if getattr(shell, key) is not None:
@@ -105,7 +112,7 @@ def check_layups(shells: Mapping[str, ShellSection], materials: Mapping[str, Any
         if shell.direction is None:
             raise ValueError(f"{where}.direction: missing; expected [x, y, z], where angle 0 of the layers points")
         for number, layer in enumerate(shell.layers):
-            _check_material(f"{where}.layers.{number}", layer.material, materials)
+            check_material(f"{where}.layers.{number}", layer.material, materials)
 
 
 def _check_stiffness(where: str, shell: ShellSection) -> None:
@@ -120,8 +127,58 @@ def _check_stiffness(where: str, shell: ShellSection) -> None:
             raise ValueError(f"{where}.{key}: belongs to a material or layers; put it into the matrices")
 
 
-def _check_material(where: str, material: str | None, materials: Mapping[str, Any]) -> None:
-    if material is None and len(materials) != 1:
-        raise ValueError(f"{where}.material: missing; there are {len(materials)} materials, name one")
-    if material is not None and material not in materials:
-        raise ValueError(f'{where}.material = "{material}": there is no such material{nearest(material, materials)}')
+def shell_properties(
+    shells: Mapping[str, ShellSection], materials: Mapping[str, MaterialSection]
+) -> "dict[str, AnyShellProperty]":
+    """Return thickness and material, or layers, for each group of cells."""
+    from fe_models.elements.shells.shell_property import ShellProperty
+
+    made: dict[str, AnyShellProperty] = {}
+    for shell in shells.values():
+        if shell.stiffness is not None:
+            made |= dict.fromkeys(shell.cells, _given_stiffness(shell))
+            continue
+        if shell.layers:
+            made |= dict.fromkeys(shell.cells, _laminate_of(shell, materials))
+            continue
+        assert shell.thickness is not None  # the model has checked it
+        material = isotropic_of(shell, materials, "shells of one thickness (not of layers)")
+        item = ShellProperty(
+            shell.thickness, material, offset=shell.offset, added_mass=shell.added_mass,
+            bending_ratio=shell.bending_ratio, shear_ratio=shell.shear_ratio,
+        )  # fmt: skip
+        made |= dict.fromkeys(shell.cells, item)
+    return made
+
+
+def _given_stiffness(shell: ShellSection) -> "AnyShellProperty":
+    from fe_models.elements.shells.shell_property import StiffnessProperty
+
+    # the model has checked that all are given
+    assert shell.thickness is not None
+    assert shell.stiffness is not None
+    assert shell.shear_stiffness is not None
+    assert shell.direction is not None
+    return StiffnessProperty(
+        shell.thickness,
+        tuple(tuple(row) for row in shell.stiffness),
+        tuple(tuple(row) for row in shell.shear_stiffness),
+        shell.direction,
+        offset=shell.offset,
+        added_mass=shell.added_mass,
+    )
+
+
+def _laminate_of(shell: ShellSection, materials: Mapping[str, MaterialSection]) -> "AnyShellProperty":
+    from fe_models.elements.shells.shell_property import LaminateProperty, Layer, symmetric
+
+    layers = []
+    for layer in shell.layers:
+        name = layer.material or next(iter(materials))
+        layers.append(Layer(material_of(name, materials[name]), layer.thickness, layer.angle))
+    assert shell.direction is not None  # the model has checked it
+    stack = symmetric(layers) if shell.symmetric else tuple(layers)
+    return LaminateProperty(
+        stack, shell.direction, offset=shell.offset, added_mass=shell.added_mass,
+        bending_ratio=shell.bending_ratio, shear_ratio=shell.shear_ratio,
+    )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Report of a shell mesh: numbers and findings, before any solution."""
+"""Reports of meshes of shells and of lines: numbers and findings, before any solution."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -14,14 +14,16 @@ from fe_models.checks.report import Finding, Report
 from fe_models.elements.beams.attachments import RigidLink, Spring
 from fe_models.elements.shells.quality import WARP_LIMIT, cell_quality
 from fe_models.elements.shells.skin import cell_edges
+from fe_models.foundation.arrays import IntArray
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from fe_models.foundation.units import Units
+from fe_models.meshes.line_mesh import LineMesh
 from fe_models.meshes.objects.as_mesh import as_shell_mesh
 from fe_models.meshes.shell_mesh import ShellMesh
 
-__all__ = ["ShellReport", "report_shell"]
+__all__ = ["FrameReport", "ShellReport", "report_frame", "report_shell"]
 
 COINCIDENCE = 1e-6  #: distance of coincident nodes over the diagonal of the bounding box
 WARP_NOTED = 10.0  #: angle between the two halves of a quad above which a warning is given [degree]
@@ -108,24 +110,9 @@ def report_shell(
     mesh = as_shell_mesh(mesh)
     findings, area, warp = _judge_cells(mesh)
     edges = cell_edges(tuple(mesh.cells.values()))
-    pairs = [edges.nodes, mesh.lines, *[np.array([spring.nodes]) for spring in springs]]
-    pairs += [np.array([(link.node, follower) for follower in link.followers]) for link in links]
-    joined = np.concatenate(pairs)
-    n = len(mesh.nodes)
-    graph = sp.coo_array((np.ones(len(joined)), (joined[:, 0], joined[:, 1])), shape=(n, n))
-    n_parts, part = sp.csgraph.connected_components(graph, directed=False)
+    part, found = _parts(mesh, [edges.nodes, mesh.lines], "cell, stiffener", springs, links)
+    findings += found
     size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
-    if n_parts > 1:
-        first = [int(np.flatnonzero(part == k)[0]) for k in range(min(n_parts, 4))]
-        findings.append(
-            Finding(
-                "parts",
-                True,
-                f"{n_parts} parts that no cell, stiffener, link or spring joins, with the nodes "
-                f"{', '.join(_names(mesh, first))}; merge coincident nodes, or accept parts that an interface holds "
-                "together",
-            )
-        )
     close = cKDTree(mesh.nodes).query_pairs(COINCIDENCE * size) if size else set()
     if close:
         pair = min(close)
@@ -149,17 +136,16 @@ def report_shell(
                 "unless the walls are intended like this",
             )
         )
-    numbers = BodyNumbers(size=size, materials=tuple(materials))
-    findings += [Finding("units", is_error, text) for is_error, text in implausible_numbers(units, numbers)]
+    findings += _units(units, size, materials)
     return ShellReport(
         mesh.source,
         units,
-        n,
+        len(mesh.nodes),
         {kind: len(cells) for kind, cells in mesh.cells.items()},
         len(mesh.lines),
         area,
         warp,
-        int(n_parts),
+        int(part.max()) + 1,
         int((edges.count == 1).sum()),
         tuple(findings),
     )
@@ -211,5 +197,102 @@ def _judge_cells(mesh: ShellMesh) -> tuple[list[Finding], float, float]:
     return findings, area, warp
 
 
-def _names(mesh: ShellMesh, nodes: Iterable[int]) -> list[str]:
+@dataclass(frozen=True, eq=False)
+class FrameReport(Report):
+    """Numbers of a mesh of lines, and findings."""
+
+    source: str
+    units: Units
+    n_nodes: int
+    n_lines: int
+    length: float  #: total length of all lines [m]
+    n_parts: int  #: number of parts that no line, link or spring connects
+    findings: tuple[Finding, ...]
+
+    def numbers(self) -> list[tuple[str, str]]:
+        """Return label and value of each number, as text."""
+        return [
+            ("file", self.source),
+            ("nodes", str(self.n_nodes)),
+            ("lines", str(self.n_lines)),
+            ("length of all lines", f"{self.length:.6g} {self.units.length_symbol}"),
+            ("connected parts", str(self.n_parts)),
+        ]
+
+
+def report_frame(
+    mesh: LineMesh,
+    materials: Iterable[AnyMaterial],
+    *,
+    units: Units,
+    springs: Iterable[Spring] = (),
+    links: Iterable[RigidLink] = (),
+) -> FrameReport:
+    """Measure a frame, and check whether it is connected and whether its units are plausible.
+
+    Parameters
+    ----------
+    mesh
+        Nodes and lines.
+    materials
+        Materials of the sections.
+    units
+        Declared unit system.
+    springs, links
+        Springs and rigid links, which also join parts.
+    """
+    part, findings = _parts(mesh, [mesh.lines], "line", springs, links)
+    size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
+    close = cKDTree(mesh.nodes).query_pairs(COINCIDENCE * size) if size else set()
+    apart = [pair for pair in close if part[pair[0]] != part[pair[1]]]
+    if apart:
+        findings.append(
+            Finding(
+                "coincident",
+                False,
+                f"{len(apart)} pairs of nodes of different parts lie at one place, first "
+                f"{' and '.join(_names(mesh, apart[0]))}; merge them if the parts are one",
+            )
+        )
+    findings += _units(units, size, materials)
+    ends = mesh.nodes[mesh.lines]
+    length = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
+    n_parts = int(part.max()) + 1
+    return FrameReport(mesh.source, units, len(mesh.nodes), len(mesh.lines), length, n_parts, tuple(findings))
+
+
+def _parts(
+    mesh: ShellMesh | LineMesh, pairs: list[IntArray], what: str, springs: Iterable[Spring], links: Iterable[RigidLink]
+) -> tuple[IntArray, list[Finding]]:
+    """Return the part of each node, from 0, and the finding if there are several.
+
+    Parameters
+    ----------
+    pairs
+        Nodes that belong together, (n, 2) each.
+    what
+        Elements that join nodes, for the message.
+    """
+    pairs = [*pairs, *[np.array([spring.nodes]) for spring in springs]]
+    pairs += [np.array([(link.node, follower) for follower in link.followers]) for link in links]
+    joined, n = np.concatenate(pairs), len(mesh.nodes)
+    graph = sp.coo_array((np.ones(len(joined)), (joined[:, 0], joined[:, 1])), shape=(n, n))
+    n_parts, part = sp.csgraph.connected_components(graph, directed=False)
+    if n_parts == 1:
+        return part, []
+    first = [int(np.flatnonzero(part == k)[0]) for k in range(min(n_parts, 4))]
+    words = (
+        f"{n_parts} parts that no {what}, link or spring joins, with the nodes {', '.join(_names(mesh, first))}; "
+        "merge coincident nodes, or accept parts that an interface holds together"
+    )
+    return part, [Finding("parts", True, words)]
+
+
+def _units(units: Units, size: float, materials: Iterable[AnyMaterial]) -> list[Finding]:
+    """Return the findings about implausible numbers."""
+    numbers = BodyNumbers(size=size, materials=tuple(materials))
+    return [Finding("units", is_error, text) for is_error, text in implausible_numbers(units, numbers)]
+
+
+def _names(mesh: ShellMesh | LineMesh, nodes: Iterable[int]) -> list[str]:
     return [str(mesh.node_numbers[node] if mesh.node_numbers.size else node) for node in nodes]

@@ -5,8 +5,8 @@ from numpy.testing import assert_allclose
 from cms.errors import JobError
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
-from cms.jobs.shell_body import shell_properties_of
 from fe_models import read_mesh, solid_body, unit_system
+from fe_models.assembly.tables.shells import shell_properties
 from fe_models.body import OrthotropicMaterial
 from fe_models.errors import MaterialError
 from tests.bodies import box_mesh
@@ -81,9 +81,9 @@ def test_impossible_numbers_are_refused_in_words(job_file):
 
 
 def test_shells_refuse_an_orthotropic_material(job_file):
-    path = job_file(("[reduction]", "[shells.skin]\nthickness = 0.01\n\n[reduction]"))
+    job = read_job(job_file(("[reduction]", "[shells.skin]\nthickness = 0.01\n\n[reduction]")))
     with pytest.raises(
-        JobError,
+        MaterialError,
         match=r"materials\.spruce: it is not isotropic; shells of one thickness \(not of layers\) take isotropic",
     ):
-        shell_properties_of(read_job(path))
+        shell_properties(job.shells, job.materials)

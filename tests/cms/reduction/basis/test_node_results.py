@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cms.reduction.basis.node_motion import are_spread
+from cms.reduction.basis.node_results import are_spread
 
 LINE = np.array([0.6, -0.64, 0.48])
 ACROSS = np.array([0.8, 0.48, -0.36])

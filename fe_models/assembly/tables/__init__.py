@@ -1,0 +1,1 @@
+"""Tables that describe a model: materials, sections, attachments, places, as files and Python give them."""
