@@ -22,7 +22,8 @@ from fe_models.assembly.tables.beams import PLANES, BeamSection, RodSection
 from fe_models.assembly.tables.materials import MaterialSection, SolidSection, check_material
 from fe_models.assembly.tables.places import InterfaceSection, LoadCaseSection
 from fe_models.assembly.tables.shells import ShellSection, check_layups
-from fe_models.foundation.errors import BodyError
+from fe_models.foundation.errors import ArgumentError, BodyError
+from fe_models.foundation.records import checked_fields
 from fe_models.foundation.toml_file import Table, validated
 from fe_models.foundation.units import Units, unit_system
 from fe_models.foundation.words import nearest, quoted
@@ -50,6 +51,7 @@ class ModelTables(Table):
 
 
 @dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
 class FEModel:
     """Finite element model before assembly.
 
