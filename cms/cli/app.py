@@ -122,7 +122,7 @@ def faces_command(
     file: Annotated[Path, typer.Argument(help="CAD file: .step .stp .iges .igs .brep.")],
     units: Annotated[str, typer.Option(help="Unit system the lengths are shown in.")] = "mm-t-s",
     select: Annotated[
-        list[str] | None, typer.Option("--select", "-s", help="Only faces such as 'cylinder r=12'; repeatable.")
+        list[str] | None, typer.Option("--select", help="Only faces such as 'cylinder r=12'; repeatable.")
     ] = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Picture with the numbers of the faces (.png).")
@@ -323,7 +323,7 @@ def import_command(
 @guarded
 def check_command(
     file: ModalFile,
-    job: Annotated[Path | None, typer.Option("--job", "-j", help="Job file of the full model to compare with.")] = None,
+    job: Annotated[Path | None, typer.Option("--job", help="Job file of the full model to compare with.")] = None,
     band: Annotated[
         float | None, typer.Option(help="Highest frequency of interest [Hz]; default: highest kept mode / 1.5.")
     ] = None,
@@ -402,7 +402,7 @@ def frf_command(
     ] = None,
     inertance: Annotated[bool, typer.Option("--inertance", help="Acceleration instead of displacement.")] = False,
     job: Annotated[
-        Path | None, typer.Option("--job", "-j", help="Job file of the full model, to draw its response too.")
+        Path | None, typer.Option("--job", help="Job file of the full model, to draw its response too.")
     ] = None,
     output: Annotated[
         list[Path] | None,
@@ -506,7 +506,7 @@ def correlate_command(
 @guarded
 def split_command(
     job: Annotated[Path, typer.Argument(help="Job file (TOML) of the whole body.")],
-    n: Annotated[int | None, typer.Option("--parts", "-n", help="Number of parts of equal length.")] = None,
+    n: Annotated[int | None, typer.Option("--parts", help="Number of parts of equal length.")] = None,
     at: Annotated[str | None, typer.Option(help="Instead of -n: cut positions along the axis, such as 40,80.")] = None,
     axis: Annotated[
         str | None, typer.Option(help="Normal direction of the cuts: x, y, z or x,y,z; default: the longest axis.")
@@ -522,11 +522,11 @@ def split_command(
 
     It writes a job for every part, and a system file that joins them. Without -o: rod.toml gives the folder rod_parts.
 
-    Example: cms split blade.toml -n 4 --reduce
+    Example: cms split blade.toml --parts 4 --reduce
 
     Example: cms split rod.toml --at 40,80 --axis x
 
-    Example: cms split wing.toml -n 8 --reduce --workers dask
+    Example: cms split wing.toml --parts 8 --reduce --workers dask
     """
     from cms.cli.split import SplitRequest, direction_of, places_of, split_job
 

@@ -225,7 +225,7 @@ def campbell_command(
     center: Center = "0,0,0",
     n_modes: Modes = 12,
     outputs: Annotated[
-        list[str], typer.Option("--out", "-m", help="A name of [outputs] or [sensors], sensor.column; repeatable.")
+        list[str], typer.Option("--out", help="A name of [outputs] or [sensors], sensor.column; repeatable.")
     ] = [],  # noqa: B006
     set_values: SetValues = [],  # noqa: B006
 ) -> None:

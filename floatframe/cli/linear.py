@@ -27,7 +27,7 @@ Inputs = Annotated[
 ]
 Outputs = Annotated[
     list[str],
-    typer.Option("--out", "-m", help="A name of [outputs] or [sensors], sensor.column, or as --input; repeatable."),
+    typer.Option("--out", help="A name of [outputs] or [sensors], sensor.column, or as --input; repeatable."),
 ]
 
 

@@ -202,7 +202,7 @@ def gradient_command(
     system: Annotated[Path, typer.Argument(help="System file (TOML), see docs/system_file.md.")],
     outputs: Annotated[
         list[str],
-        typer.Option("--out", "-m", help='A column, "tip x"; "tip x:rms"; of modes "frequency 1"; repeatable.'),
+        typer.Option("--out", help='A column, "tip x"; "tip x:rms"; of modes "frequency 1"; repeatable.'),
     ] = [],  # noqa: B006
     parameters: Annotated[
         list[str], typer.Option("--parameter", "-p", help="KEY.PATH of a number in the file; repeatable.")
@@ -221,12 +221,12 @@ def gradient_command(
     Sensors as `floatframe info` lists them. The cost of direct grows with the number of parameters, that of adjoint
     with the number of outputs.
 
-    Example: floatframe gradient crank.toml -m "tip x" -p bodies.rod.mass -p forces.spring.stiffness
+    Example: floatframe gradient crank.toml --out "tip x" -p bodies.rod.mass -p forces.spring.stiffness
 
-    Example: floatframe gradient governor.toml --analysis rotation --omega 0,0,6 -m "arm.distance value" -p
+    Example: floatframe gradient governor.toml --analysis rotation --omega 0,0,6 --out "arm.distance value" -p
     forces.spring.stiffness
 
-    Example: floatframe gradient arm.toml --analysis modes -m "frequency 1" -p forces.bush.stiffness
+    Example: floatframe gradient arm.toml --analysis modes --out "frequency 1" -p forces.bush.stiffness
     """
     from floatframe.cli.analyses import vector
     from floatframe.design.gradients import sensitivities

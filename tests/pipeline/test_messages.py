@@ -2,6 +2,7 @@
 
 import ast
 import re
+from collections import defaultdict
 from collections.abc import Iterator
 
 import click
@@ -115,3 +116,16 @@ def test_calls_on_pages_name_commands_and_options_that_exist():
                     wrong += [f"{page.name}: {program} {name} {word}" for word in OPTION.findall(rest)
                               if word not in options_of(command)]  # fmt: skip
     assert not wrong, "\n".join(wrong)
+
+
+def test_a_short_option_has_one_meaning_in_both_programs():
+    meanings = defaultdict(set)
+    for program in PROGRAMS.values():
+        for command in commands_of(program).values():
+            for parameter in command.params:
+                long = next((word for word in parameter.opts if word.startswith("--")), "")
+                for word in parameter.opts:
+                    if word.startswith("-") and not word.startswith("--"):
+                        meanings[word].add(long)
+    assert {word: long for word, long in meanings.items() if len(long) > 1} == {}
+    assert {"-o", "-j"} <= set(meanings)

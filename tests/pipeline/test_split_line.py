@@ -490,10 +490,10 @@ def test_command_splits_reduces_and_says_where(beam):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["-n", "2", "--at", "0.5"], "either a number of parts or the places"),
+        (["--parts", "2", "--at", "0.5"], "either a number of parts or the places"),
         (["--at", "a,b"], "--at a,b: expected numbers"),
-        (["-n", "2", "--axis", "w"], "--axis"),
-        (["-n", "2", "-o", "mast.toml"], "this is a file; expected a folder"),
+        (["--parts", "2", "--axis", "w"], "--axis"),
+        (["--parts", "2", "-o", "mast.toml"], "this is a file; expected a folder"),
     ],
 )
 def test_command_names_the_option_that_is_wrong(beam, arguments, message, monkeypatch):

@@ -6,6 +6,7 @@ import numpy as np
 import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.documents.table import Table
 from fe_models.foundation.presentation import Summary, presented
 from fe_models.foundation.records import checked_fields
 from floatframe.analyses.linear.linearization import LinearSystem
@@ -60,13 +61,34 @@ class SystemModes:
     def summary(self) -> Summary:
         """Return the content shown by `repr` and notebooks: frequency, damping and moving bodies of each mode."""
         rows = [
-            (str(k + 1), f"{f:.6g}", f"{ratio + 0.0:.3g}", self.bodies[int(np.argmax(shares))] if len(shares) else "")
-            for k, (f, ratio, shares) in enumerate(
-                zip(self.frequencies, self.damping_ratios, self.energy_shares, strict=True)
+            (str(k + 1), f"{f:.6g}", f"{ratio + 0.0:.3g}", body)
+            for k, (f, ratio, body) in enumerate(
+                zip(self.frequencies, self.damping_ratios, self.moves_most, strict=True)
             )
         ]
         title = f"SystemModes: {len(rows)} modes, {'stable' if self.is_stable else 'unstable'}"
         return Summary(title, (), ("mode", "Hz", "damping ratio", "moves most"), rows)
+
+    def to_table(self, time_unit: float = 1.0) -> Table:
+        """Return damped and natural frequency in Hz, damping ratio, growth and moving body of each mode, a row each.
+
+        time_unit: the unit of time of the system [s].
+        """
+        columns = {
+            "mode": np.arange(len(self.eigenvalues)) + 1,
+            "frequency": self.frequencies / time_unit,
+            "natural frequency": self.natural_frequencies / time_unit,
+            "damping ratio": self.damping_ratios,
+            "growth": self.eigenvalues.real / time_unit,
+            "moves most": self.moves_most,
+            **{f"energy {name}": share for name, share in zip(self.bodies, self.energy_shares.T, strict=True)},
+        }
+        return Table(columns, {"frequency": "Hz", "natural frequency": "Hz", "growth": "1/s"})
+
+    @property
+    def moves_most(self) -> tuple[str, ...]:
+        """Name of the body with the largest share in the kinetic energy of each mode."""
+        return tuple(self.bodies[int(np.argmax(shares))] if len(shares) else "" for shares in self.energy_shares)
 
     @property
     def frequencies(self) -> Array:

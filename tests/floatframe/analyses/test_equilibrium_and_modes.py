@@ -19,6 +19,7 @@ from floatframe import (
     JointForce,
     Marker,
     PointForce,
+    PrismaticJoint,
     RevoluteJoint,
     RigidBody,
     SphericalJoint,
@@ -485,6 +486,23 @@ def test_frequencies_of_a_flapping_rod_rise_with_the_speed_as_southwell_says():
     exact = speeds * np.sqrt((J - J_x + moment) / J)
     flap = np.abs(locus.eigenvalues.imag).max(axis=1)
     assert_allclose(flap, exact, rtol=1e-7)
+
+
+def test_modes_are_a_table_in_hertz():
+    """An oscillator damped by a fifth and a hinge without resistance, in a system of milliseconds."""
+    mass, rotor = (RigidBody(name, 2.0, np.diag([0.1, 0.2, 0.3]), position=(0, 0, 0)) for name in ("mass", "rotor"))
+    spring = SpringDamper("spring", Marker("ground", position=(-1, 0, 0)), Marker("mass"), 8.0, damping=1.6, free_length=1.0)
+    rail = PrismaticJoint("rail", GROUND, Marker("mass"), axis=(1, 0, 0))
+    pin = RevoluteJoint("pin", GROUND, Marker("rotor"))
+    system = System([mass, rotor], [rail, pin], [spring], units="mm-kg-ms")
+    table = system_modes(linearize(system, static_equilibrium(system))).to_table(system.units.time)
+    frame = table.to_dataframe("mode")
+    assert list(frame["moves most"]) == ["rotor", "mass"]
+    assert_allclose(frame["natural frequency"], [0.0, 2e3 / (2 * np.pi)], rtol=0, atol=1e-6)
+    assert_allclose(frame["frequency"], [0.0, 2e3 * np.sqrt(1 - 0.2**2) / (2 * np.pi)], rtol=0, atol=1e-6)
+    assert_allclose(frame["damping ratio"], [0.0, 0.2], rtol=0, atol=1e-9)
+    assert_allclose(frame["growth"], [0.0, -0.2 * 2e3], rtol=0, atol=1e-6)
+    assert_allclose(frame["energy mass"], [0.0, 1.0], rtol=0, atol=1e-9)
 
 
 def test_modes_say_which_body_moves():

@@ -243,7 +243,7 @@ def test_response_draws_and_writes_what_the_textbook_says(pendulum):
         20,
         "-i",
         "hinge.angle",
-        "-m",
+        "--out",
         "turn",
         "-o",
         pendulum.with_suffix(".csv"),
@@ -335,7 +335,7 @@ def test_files_name_sensors_as_outputs_and_bases_as_inputs(pendulum):
     assert_allclose(H[0, 0], -m * (1 + c * s**2 * turn), rtol=1e-9)
     for name in ("side", "load.force x", "bearing.force x"):
         csv_path = pendulum.with_suffix(".csv")
-        run("response", pendulum, "--band", "0.7:0.9", "-m", name, "-o", csv_path)
+        run("response", pendulum, "--band", "0.7:0.9", "--out", name, "-o", csv_path)
         with open(csv_path, newline="") as file:
             rows = list(csv.reader(file))
         assert_allclose(float(rows[1][1]), abs(H[0, 0]), rtol=1e-6)

@@ -47,7 +47,16 @@ def invoke(*words, code=0):
 
 
 def test_the_command_says_what_the_function_returns(swing):
-    asked = ["-m", "hinge.angle value", "-m", "hinge.angle rate:rms", "-p", "bodies.rod.mass", "-p", "system.gravity.1"]
+    asked = [
+        "--out",
+        "hinge.angle value",
+        "--out",
+        "hinge.angle rate:rms",
+        "-p",
+        "bodies.rod.mass",
+        "-p",
+        "system.gravity.1",
+    ]
     told = json.loads(invoke("gradient", swing, *asked, "--json", "--method", "adjoint"))
     outputs = {"hinge.angle value": "hinge.angle value", "rms": ("hinge.angle rate", "rms")}
     found = ff.design.sensitivities(str(swing), outputs, ["bodies.rod.mass", "system.gravity.1"], method="adjoint")
@@ -64,7 +73,7 @@ def test_the_command_says_what_the_function_returns(swing):
 
 
 def test_refusals(swing):
-    asked = ["gradient", swing, "-m", "hinge.angle value"]
+    asked = ["gradient", swing, "--out", "hinge.angle value"]
     assert "did you mean 'rod'" in invoke(*asked, "-p", "bodies.rodd.mass", code=2)
     assert "did you mean 'mass'" in invoke(*asked, "-p", "bodies.rod.masss", code=2)
     assert "at least one" in invoke(*asked, code=2)

@@ -141,7 +141,7 @@ def test_a_sweep_begins_each_run_in_its_equilibrium(folder):
 
 def test_computations_that_begin_as_placed_refuse_another_start(folder):
     (folder / "cart.toml").write_text(CART + 'start = "equilibrium"\n')
-    result = CliRunner().invoke(app, ["gradient", str(folder / "cart.toml"), "-p", "mass", "-m", "up.distance"])
+    result = CliRunner().invoke(app, ["gradient", str(folder / "cart.toml"), "-p", "mass", "--out", "up.distance"])
     assert result.exit_code == 2
     assert "run.start: this computation begins with the bodies as placed; remove the key" in result.stderr
 
