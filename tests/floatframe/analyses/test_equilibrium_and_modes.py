@@ -491,7 +491,9 @@ def test_frequencies_of_a_flapping_rod_rise_with_the_speed_as_southwell_says():
 def test_modes_are_a_table_in_hertz():
     """An oscillator damped by a fifth and a hinge without resistance, in a system of milliseconds."""
     mass, rotor = (RigidBody(name, 2.0, np.diag([0.1, 0.2, 0.3]), position=(0, 0, 0)) for name in ("mass", "rotor"))
-    spring = SpringDamper("spring", Marker("ground", position=(-1, 0, 0)), Marker("mass"), 8.0, damping=1.6, free_length=1.0)
+    spring = SpringDamper(
+        "spring", Marker("ground", position=(-1, 0, 0)), Marker("mass"), 8.0, damping=1.6, free_length=1.0
+    )
     rail = PrismaticJoint("rail", GROUND, Marker("mass"), axis=(1, 0, 0))
     pin = RevoluteJoint("pin", GROUND, Marker("rotor"))
     system = System([mass, rotor], [rail, pin], [spring], units="mm-kg-ms")
