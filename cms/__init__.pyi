@@ -12,9 +12,14 @@ from . import modes as modes
 from . import reduction as reduction
 from .assessment.quality.body_check import check_body as check_body
 from .assessment.quality.reduction_check import check_reduction as check_reduction
+from .assessment.quality.reference.port_model import frf as frf
+from .assessment.report.view import view_mode as view_mode
 from .body.modal_file.file import read as read
 from .body.modal_file.file import write as write
 from .body.reduced_body import ReducedBody as ReducedBody
+from .jobs.acceptance.accept import accept as accept
+from .jobs.studies.comparison_of_job import compare as compare
+from .jobs.studies.correlation_file import correlate as correlate
 from .modes.mode_set import ModeSet as ModeSet
 from .modes.mode_sets import MODE_SETS as MODE_SETS
 from .modes.mode_sets.classical import craig_bampton as craig_bampton

@@ -12,7 +12,7 @@ from cms.assessment.quality.reference.port_model import (
     FrequencyResponse,
     PortModel,
     file_resonances,
-    file_response,
+    frf,
     modal_response,
     resonances,
 )
@@ -66,7 +66,7 @@ def run_frf(request: FrfRequest) -> None:
         frequencies = resonance_grid(frequencies, *resonances(model, damping=damping or 0.0, time=time))
         whole = modal_response(model, frequencies, damping=damping or 0.0, time=time)
         full = whole.between(request.excited, request.answering)
-    own = file_response(reduced, frequencies, damping=damping).between(request.excited, request.answering)
+    own = frf(reduced, frequencies, damping=damping).between(request.excited, request.answering)
     print_peaks(request, reduced, own, full, pairs)
     write_outputs(
         paths, table=lambda: response_table(request, reduced, own, full, pairs),

@@ -11,11 +11,11 @@ from typer.testing import CliRunner
 
 import cms
 import floatframe as ff
-from cms.assessment.compare.compare import compare
+from cms.assessment.compare.compare import compare_sets
 from cms.assessment.quality.body_check import check_body
 from cms.assessment.quality.of_body.effective_mass import effective_mass
 from cms.assessment.quality.reduction_check import check_reduction
-from cms.assessment.quality.reference.port_model import file_response
+from cms.assessment.quality.reference.port_model import frf
 from cms.body.modal_file.file import read_sealed
 from cms.cli.app import app
 from cms.errors import BodyError
@@ -81,7 +81,7 @@ def test_a_held_body_passes_the_checks_and_is_not_asked_to_be_free(held, reduced
 def test_its_response_at_rest_is_the_flexibility_of_the_held_body(held, reduced):
     b = held.b
     exact = np.linalg.inv(held.K.toarray())[np.ix_(b, b)]
-    H = file_response(reduced, np.array([1e-3])).H[0].real
+    H = frf(reduced, np.array([1e-3])).H[0].real
     assert_allclose(H, exact, rtol=0, atol=1e-6 * np.abs(exact).max())
 
 
@@ -127,7 +127,7 @@ def test_frames_of_free_and_held_bodies_are_not_exchanged(held, reduced):
 
 
 def test_sets_of_a_held_body_are_compared(held):
-    found = compare(held, ["guyan", "craig-bampton", "rubin"], [0, 8], n_reference=3)
+    found = compare_sets(held, ["guyan", "craig-bampton", "rubin"], [0, 8], n_reference=3)
     assert found.set("rubin").verdict == "pass"
     assert found.set("guyan").verdict != "pass"
 

@@ -1,4 +1,4 @@
-from .compare import compare as compare
+from .compare import compare_sets as compare_sets
 from .comparison import Comparison as Comparison
 from .comparison import Point as Point
 from .comparison import SetResult as SetResult

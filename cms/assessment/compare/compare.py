@@ -34,13 +34,13 @@ from fe_models.foundation.tasks.task_map import WorkerError
 from fe_models.foundation.tasks.workers import Workers, tasks_of
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["SetJudge", "SetTask", "compare", "draw_modes", "reference_basis", "set_results", "thinned_surface"]
+__all__ = ["SetJudge", "SetTask", "compare_sets", "draw_modes", "reference_basis", "set_results", "thinned_surface"]
 
 
 Stage = Callable[[str], AbstractContextManager[Any]]
 
 
-def compare(
+def compare_sets(
     body: FEBody,
     sets: Sequence[str] | Mapping[str, Mapping[str, Any]],
     counts: Sequence[int],

@@ -2,7 +2,7 @@ from .correlate import Correlation as Correlation
 from .correlate import DampingFit as DampingFit
 from .correlate import Pairing as Pairing
 from .correlate import comac as comac
-from .correlate import correlate as correlate
+from .correlate import correlate_modes as correlate_modes
 from .correlate import fit_damping as fit_damping
 from .correlate import mac as mac
 from .correlate import orthogonality as orthogonality

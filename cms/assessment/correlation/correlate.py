@@ -21,7 +21,7 @@ __all__ = [
     "ModePair",
     "Pairing",
     "comac",
-    "correlate",
+    "correlate_modes",
     "fit_damping",
     "mac",
     "mass_at_rows",
@@ -218,7 +218,7 @@ class Correlation:
         }  # fmt: skip
 
 
-def correlate(
+def correlate_modes(
     measured: MeasuredModes,
     model: ModelModes,
     *,

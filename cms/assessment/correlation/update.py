@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from cms.assessment.correlation.correlate import Correlation, Pairing, correlate
+from cms.assessment.correlation.correlate import Correlation, Pairing, correlate_modes
 from cms.assessment.correlation.errors import CorrelationError
 from cms.assessment.correlation.measured import MeasuredModes
 from cms.assessment.correlation.model_modes import modes_of_body
@@ -123,7 +123,7 @@ def update_model(
 
     def compared(theta: Array) -> tuple[FEBody, Correlation]:
         body = body_at(start * (1 + theta))
-        found = correlate(measured, modes_of_body(body, top, held=held), placement=placement, pairing=pairing)
+        found = correlate_modes(measured, modes_of_body(body, top, held=held), placement=placement, pairing=pairing)
         if not found.pairs:
             raise CorrelationError(
                 "update: no measured mode has a partner in the model; look at the MAC (points, axes, least_mac, "

@@ -33,7 +33,6 @@ from .reference.free_basis import free_basis as free_basis
 from .reference.full_reference import FullReference as FullReference
 from .reference.full_reference import usable_band as usable_band
 from .reference.port_model import FrequencyResponse as FrequencyResponse
-from .reference.port_model import file_response as file_response
 from .reference.port_model import modal_response as modal_response
 from .reference.port_model import port_model as port_model
 from .reference.reference_response import reference_response as reference_response

@@ -22,8 +22,12 @@ def view_mode(body: ReducedBody, mode: int, path: str | Path, *, scale: float | 
 
     Parameters
     ----------
+    body
+        A reduced body with a surface.
     mode
         Number of the mode, 1 to n_q, as `cms info` lists them.
+    path
+        The PNG file.
     scale
         Largest displacement drawn, relative to the diagonal of the body; None: 0.09.
 

@@ -124,7 +124,7 @@ def run_accept(request: AcceptRequest) -> int:
     """Check the body, write the document, print the verdict; return exit code 1 if the body is not accepted."""
     from cms.assessment.quality.errors import QualityError
     from cms.cli.job import densities_of
-    from cms.jobs.acceptance.accept import FullModel, accept_body
+    from cms.jobs.acceptance.accept import FullModel, accept
     from cms.jobs.acceptance.document import require_suffix, write_acceptance
     from fe_models.foundation.extras import extra_module
 
@@ -142,7 +142,7 @@ def run_accept(request: AcceptRequest) -> int:
             extra_module("reportlab", extra="pdf", purpose="write a document as PDF")
     model = FullModel(request.full, request.deck, request.program, densities_of(request.densities))
     with stages() as clock:
-        found = accept_body(request.file, model, band=request.band, most_dofs=request.most_dofs, stages=clock)
+        found = accept(request.file, model, band=request.band, most_dofs=request.most_dofs, stages=clock)
         with clock("document"):
             write_acceptance(found, *targets)
     todo = [(r.verdict, r.name, r.reason, r.action) for r in found.records if r.verdict in ("fail", "warn")]

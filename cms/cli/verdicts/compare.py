@@ -1,8 +1,6 @@
 """The command `cms compare`: mode sets of a job compared with its full model; table, HTML, JSON and CSV."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,9 +11,6 @@ from fe_models.foundation.words import nearest, quoted
 
 if TYPE_CHECKING:
     from cms.assessment.compare.comparison import Comparison
-    from cms.assessment.quality.reference.transient import Snapshots
-    from cms.jobs.job import Job
-    from fe_models.body.fe_body import FEBody
 
 __all__ = ["CompareRequest", "parse_load", "parse_sets", "run_compare"]
 
@@ -59,9 +54,8 @@ def run_compare(request: CompareRequest) -> None:
     CompareError
         If the requested comparison is impossible.
     """
-    from cms.assessment.compare.compare import compare
     from cms.assessment.compare.mode_counts import mode_counts
-    from cms.jobs.job import read_job
+    from cms.jobs.studies.comparison_of_job import compare
     from fe_models.foundation.tasks.workers import checked_workers
 
     require_job(request.job)
@@ -73,18 +67,14 @@ def run_compare(request: CompareRequest) -> None:
         raise CompareError(f"--reference-modes {request.n_reference}: expected 1 or more")
     loads = [parse_load(text) for text in request.loads]
     workers = None if request.workers is None else checked_workers(request.workers)
-    job = read_job(request.job)
     folder = output_folder(request.output or request.job.with_name(f"{request.job.stem}_comparison"))
     reports: list[Any] = []
     try:
         with stages() as clock:
-            body = body_of(job, clock, reports)
-            options = options_of(job, body, names, loads)
-            motion = None if request.motion is None else read_motion(request.motion, body)
             comparison = compare(
-                body, options, counts, band=request.band, n_reference=request.n_reference, pulse_at=request.pulse_at,
-                motion=motion, cache=folder / CACHE, stage=clock, workers=workers,
-                source=partial(body_of_file, request.job.absolute()),
+                request.job, names, counts, band=request.band, n_reference=request.n_reference, loads=loads,
+                pulse_at=request.pulse_at, motion=request.motion, cache=folder / CACHE, workers=workers, stages=clock,
+                on_report=reports.append,
             )  # fmt: skip
             with clock("report"):
                 written = write_report(folder, comparison, request.stills)
@@ -172,74 +162,6 @@ def output_folder(path: Path) -> Path:
     except OSError as error:
         raise CompareError(f"--output {path}: cannot be made: {error.strerror}; choose another folder") from error
     return path
-
-
-def body_of(job: "Job", clock: Any, reports: list[Any]) -> "FEBody":
-    """Return the coupled body of the job."""
-    from cms.jobs.body_of_job import job_body
-
-    return job_body(job, clock, on_report=reports.append)
-
-
-def body_of_file(path: Path) -> "FEBody":
-    """Return the coupled body of a job file; workers call this function."""
-    from cms.jobs.body_of_job import job_body
-    from cms.jobs.job import read_job
-
-    return job_body(read_job(path))
-
-
-def options_of(job: "Job", body: "FEBody", names: tuple[str, ...], loads: list[Any]) -> Mapping[str, dict[str, Any]]:
-    """Return the options of each set: those of the job for its own set, and loads for sets that need them."""
-    from cms.jobs.mode_set_of_job import set_options
-    from cms.jobs.reduction_table import mode_set_options
-
-    options: dict[str, dict[str, Any]] = {}
-    for name in names:
-        section = job.reduction.model_copy(update={"set": name, "n_modes": None, "cutoff": None, "verify": None})
-        given = set_options(body, section)
-        if name != job.reduction.set:
-            given = {key: value for key, value in given.items() if key == "loads"}
-        if loads and "loads" in mode_set_options(name):
-            given["loads"] = loads
-        options[name] = given
-    return options
-
-
-def read_motion(path: Path, body: "FEBody") -> "Snapshots":
-    """Read a reference motion from .npz: u, (n_dof, n_t), over the dofs of the coupled body, and t, (n_t,) [s].
-
-    Raises
-    ------
-    CompareError
-        If the file does not have this form.
-    """
-    import zipfile
-    from io import BytesIO
-
-    import numpy as np
-
-    from cms.assessment.quality.reference.transient import Snapshots
-    from cms.errors import CmsError
-
-    try:
-        with np.load(BytesIO(path.read_bytes()), allow_pickle=False) as file:
-            u, t = np.asarray(file["u"], dtype=float), np.asarray(file["t"], dtype=float)
-    except (ValueError, KeyError, zipfile.BadZipFile, EOFError) as error:
-        raise CompareError(
-            f"{path}: expected an .npz file with u, ({body.n_dof}, n_t), and t, (n_t,) [s]; {error}"
-        ) from error
-    if u.ndim != 2 or u.shape != (body.n_dof, len(t)) or t.ndim != 1 or not len(t):
-        raise CompareError(
-            f"{path}: u has shape {u.shape}, t {t.shape}; expected ({body.n_dof}, n_t) over the dofs of the coupled "
-            "body, and (n_t,)"
-        )
-    if not (np.isfinite(u).all() and np.isfinite(t).all()):
-        raise CompareError(f"{path}: u and t: expected finite numbers")
-    try:
-        return Snapshots.of_displacements(u, t / body.units.time)
-    except CmsError as error:
-        raise CompareError(f"{path}: {error}") from error
 
 
 def write_report(folder: Path, comparison: "Comparison", stills: int) -> list[Path]:

@@ -31,7 +31,7 @@ class CorrelateRequest:
 def run_correlate(request: CorrelateRequest) -> None:
     """Compare; update if the file has [update]; print pairs and parameters; write report and updated job."""
     from cms.assessment.correlation.errors import CorrelationError
-    from cms.jobs.studies.correlation_file import read_correlation, run_correlation
+    from cms.jobs.studies.correlation_file import correlate, read_correlation
     from cms.jobs.studies.correlation_report import correlation_document
     from fe_models.foundation.documents.write import document_content
     from fe_models.foundation.paths import replace_files
@@ -52,7 +52,7 @@ def run_correlate(request: CorrelateRequest) -> None:
                 f"--updated-job {job}: expected a file beside {asked.model.job}, whose paths are relative to its folder"
             )
     with stages() as clock:
-        result = run_correlation(asked, clock)
+        result = correlate(asked, clock)
     contents = {}
     if page is not None:
         contents[page] = document_content(correlation_document(result), page.suffix)

@@ -49,7 +49,7 @@ from fe_models.meshes.mesh import drop_unused_nodes
 if TYPE_CHECKING:
     from fe_models.files.decks.deck import Deck
 
-__all__ = ["MODES_BEYOND", "FullModel", "accept_body", "compare_with_model"]
+__all__ = ["MODES_BEYOND", "FullModel", "accept", "compare_with_model"]
 
 
 @dataclass(frozen=True)
@@ -66,9 +66,9 @@ class FullModel:
             raise QualityError("acceptance: expected a job or a deck as the full model, got both")
 
 
-def accept_body(
+def accept(
     source: ReducedBody | Path | str,
-    full: FullModel | None = None,
+    full: FullModel | Path | str | None = None,
     *,
     band: float | None = None,
     most_dofs: int = MOST_DOFS,
@@ -81,11 +81,13 @@ def accept_body(
     source
         Body, or its modal file.
     full
-        Full model of the part; None: the file is checked by itself.
+        Full model of the part, or its job file; None: the file is checked by itself.
     band
         Highest frequency of interest [Hz]; None: the customary band of the body (its highest mode divided by 1.5).
     most_dofs
         Largest number of dofs of the refined model for the estimate of the mesh error; 0: no estimate.
+    stages
+        Called with the name of each stage.
 
     Raises
     ------
@@ -95,7 +97,7 @@ def accept_body(
     stages = stages or Stages()
     file = None if isinstance(source, ReducedBody) else Path(source)
     reduced = source if isinstance(source, ReducedBody) else read(source)
-    full = full or FullModel()
+    full = full if isinstance(full, FullModel) else FullModel(job=full)
     if band is not None and not (np.isfinite(band) and band > 0):
         raise QualityError(f"acceptance: band: expected a frequency above 0 [Hz], got {band:g}")
     compared, left_out, job = "", None, None

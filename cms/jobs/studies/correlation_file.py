@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from cms.assessment.correlation.correlate import Correlation, DampingFit, Pairing, correlate, fit_damping
+from cms.assessment.correlation.correlate import Correlation, DampingFit, Pairing, correlate_modes, fit_damping
 from cms.assessment.correlation.errors import CorrelationError
 from cms.assessment.correlation.measured import MeasuredModes
 from cms.assessment.correlation.mode_table import read_mode_table
@@ -28,7 +28,7 @@ from fe_models.foundation.toml_file import PathBeside, Table, Vector3, kind_fiel
 from fe_models.foundation.units import Units, unit_system
 from fe_models.meshes.mesh import Mesh, drop_unused_nodes
 
-__all__ = ["CorrelationFile", "CorrelationResult", "read_correlation", "run_correlation"]
+__all__ = ["CorrelationFile", "CorrelationResult", "correlate", "read_correlation"]
 
 METRES = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254}
 OF_MESH = ("body", "mesh_size")  #: tables of a job that affect its mesh
@@ -142,14 +142,22 @@ def read_correlation(path: str | Path) -> CorrelationFile:
     return validated(CorrelationFile, read_toml(path, CorrelationError), path, CorrelationError, context=path.parent)
 
 
-def run_correlation(asked: CorrelationFile, stages: Stages | None = None) -> CorrelationResult:
+def correlate(file: CorrelationFile | Path | str, stages: Stages | None = None) -> CorrelationResult:
     """Read test and model, compare them, and update the job if requested.
+
+    Parameters
+    ----------
+    file
+        A correlation file (docs/test_and_model.md), or one that has been read.
+    stages
+        Called with the name of each stage.
 
     Raises
     ------
     CmsError, FeModelsError
         If test or model cannot be read, or their points or modes do not fit.
     """
+    asked = file if isinstance(file, CorrelationFile) else read_correlation(file)
     stages = stages or Stages()
     placement, pairing = placement_of(asked.test), Pairing(**asked.pairs.model_dump())
     if asked.model.body is not None:
@@ -158,7 +166,7 @@ def run_correlation(asked: CorrelationFile, stages: Stages | None = None) -> Cor
         reduced = read(asked.model.body)
         measured = measured_modes(asked.test, reduced.units.length)
         with stages("compare"):
-            found = correlate(measured, modes_of_file(reduced), placement=placement, pairing=pairing)
+            found = correlate_modes(measured, modes_of_file(reduced), placement=placement, pairing=pairing)
         return CorrelationResult(found, None, damping_of(measured, reduced.units), None)
     assert asked.model.job is not None
     path = asked.model.job
@@ -172,7 +180,7 @@ def run_correlation(asked: CorrelationFile, stages: Stages | None = None) -> Cor
         top = asked.band or MODES_BEYOND * float(measured.frequencies.max())
         with stages("compare"):
             model = modes_of_body(body, top, held=asked.model.held)
-            found = correlate(measured, model, placement=placement, pairing=pairing)
+            found = correlate_modes(measured, model, placement=placement, pairing=pairing)
         return CorrelationResult(found, None, damping_of(measured, units), None)
     parameters = tuple(parameter_of(name, table, content, path) for name, table in asked.update.parameters.items())
     with stages("update"):

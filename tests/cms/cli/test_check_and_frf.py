@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from cms.assessment.quality.errors import QualityError
 from cms.assessment.quality.of_reduction.frf import resonance_grid
-from cms.assessment.quality.reference.port_model import file_resonances, file_response
+from cms.assessment.quality.reference.port_model import file_resonances, frf
 from cms.body.modal_file.file import read, write
 from cms.cli.app import app
 from cms.cli.frf import parse_band, parse_component
@@ -139,7 +139,7 @@ def test_the_table_of_a_response_is_that_of_the_function(folder, tmp_path):
     reduced = read(folder / "bar.h5")
     grid = resonance_grid(parse_band("100:30000:60"), *file_resonances(reduced))
     assert len(grid) > 60
-    wanted = file_response(reduced, grid).between("left", "right").inertance
+    wanted = frf(reduced, grid).between("left", "right").inertance
     assert_allclose(values[:, 0], grid, rtol=0)
     assert_allclose(values[:, 1] + 1j * values[:, 2], wanted[:, 2, 2], rtol=0)
     assert_allclose(values[:, 3] + 1j * values[:, 4], wanted[:, 5, 1], rtol=0)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cms.assessment.quality.errors import QualityError
 from cms.assessment.quality.reference.free_pencil import free_elastic_modes, free_pencil, port_rows
@@ -11,7 +12,7 @@ from fe_models.foundation.arrays import MOTION_COMPONENTS, Array, frozen
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = [
-    "FrequencyResponse", "PortModel", "file_resonances", "file_response", "modal_response", "port_model", "resonances",
+    "FrequencyResponse", "PortModel", "file_resonances", "frf", "modal_response", "port_model", "resonances",
 ]  # fmt: skip
 
 CHUNK = 2**22  #: number of complex entries of the equation systems that are solved together
@@ -158,17 +159,25 @@ def file_resonances(reduced: ReducedBody, *, damping: float | None = None) -> tu
     return omega / (2 * np.pi) / reduced.units.time, ratios
 
 
-def file_response(reduced: ReducedBody, frequencies: Array, *, damping: float | None = None) -> FrequencyResponse:
+def frf(reduced: ReducedBody, frequencies: ArrayLike, *, damping: float | None = None) -> FrequencyResponse:
     """Return the response of the free reduced body between all its interfaces, from its modal file alone.
 
     Parameters
     ----------
+    reduced
+        The reduced body.
     frequencies
         Frequencies above 0, (n_f,) [Hz].
     damping
         Damping ratio of every elastic free mode; None: D of the file.
+
+    Returns
+    -------
+    FrequencyResponse
+        Receptance between all interfaces; `between("left", "right")` takes two of them.
     """
     time = reduced.units.time
+    frequencies = np.asarray(frequencies, dtype=float)
     if damping is not None:
         return modal_response(port_model(reduced), frequencies, damping=damping, time=time)
     require_frequencies(frequencies)

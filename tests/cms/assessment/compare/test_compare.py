@@ -11,7 +11,7 @@ from scipy.linalg import eigh
 from typer.testing import CliRunner
 
 import cms
-from cms.assessment.compare.compare import compare, draw_modes, thinned_surface
+from cms.assessment.compare.compare import compare_sets, draw_modes, thinned_surface
 from cms.assessment.compare.comparison import Point, SetResult
 from cms.assessment.compare.evaluation import drawn_entry
 from cms.assessment.compare.full_model import centered_directions, held_mass
@@ -68,7 +68,7 @@ def motion(body):
 
 @pytest.fixture(scope="module")
 def comparison(body, motion):
-    return compare(body, {name: LOADED.get(name, {}) for name in COMPARED}, COUNTS, n_reference=6, motion=motion)
+    return compare_sets(body, {name: LOADED.get(name, {}) for name in COMPARED}, COUNTS, n_reference=6, motion=motion)
 
 
 def value(result, k, name):
@@ -79,7 +79,7 @@ def test_sets_in_the_span_of_the_reference_are_judged_on_a_small_body():
     """24 hexahedra, 40 free modes in the band: the columns of some sets add nothing but rounding to the reference."""
     free = bar(6, 4, 1, kind="hexahedron")
     small = cms.couple(replace(free, interfaces=tuple(replace(x, kind="distributing") for x in free.interfaces)))
-    found = compare(small, ["guyan", "craig-bampton-ir", "rubin"], [10, 20], n_reference=40)
+    found = compare_sets(small, ["guyan", "craig-bampton-ir", "rubin"], [10, 20], n_reference=40)
     assert [result.verdict for result in found.sets] == ["fail", "fail", "fail"]
     for name, make in (("craig-bampton-ir", cms.modes.craig_bampton_ir), ("rubin", cms.rubin)):
         modes = make(small, n_modes=20)
@@ -170,7 +170,7 @@ def test_load_cases_are_judged_as_the_check_of_the_reduced_body_judges_them():
     f[np.flatnonzero((np.abs(free.nodes[free.dofs[:, 0], 0] - 0.5) < 0.01) & (along > 0))] = 10.0
     cases = LoadCase("push", "force", f), LoadCase("weight", "gravity", free.M @ along)
     body = cms.couple(free.with_load_cases(*cases))
-    found = compare(body, ["craig-bampton", "guyan"], [3], n_reference=4)
+    found = compare_sets(body, ["craig-bampton", "guyan"], [3], n_reference=4)
     with Families(body) as families, FullReference(families, band=found.full.band_hz) as reference:
         for modes in (cms.craig_bampton(families, n_modes=3), cms.modes.guyan(families)):
             records = check_reduction(body, modes, cms.reduce(body, modes), reference=reference)
@@ -181,7 +181,7 @@ def test_load_cases_are_judged_as_the_check_of_the_reduced_body_judges_them():
             assert np.isnan(own.data["errors"]).tolist() == [False, True]
     assert own.verdict == "warn"
     assert "static load cases" in found.set("guyan").sentence
-    plain = compare(cms.couple(free), ["guyan"], [0], n_reference=4)
+    plain = compare_sets(cms.couple(free), ["guyan"], [0], n_reference=4)
     assert plain.set("guyan").points[0].record("static-load-cases").verdict == "info"
 
 
@@ -213,7 +213,7 @@ def test_effective_mass_is_that_of_the_fixed_interface_modes_of_the_set():
     assert_allclose(total, ((Phi.T @ (body.M @ directions)[i]) ** 2).sum(axis=0), rtol=1e-8)
     carried = np.cumsum((Phi.T @ (body.M @ directions)[i]) ** 2, axis=0)
     counts = (2, 7, len(i) - 1)
-    result = compare(body, ["craig-bampton"], counts, n_reference=4).sets[0]
+    result = compare_sets(body, ["craig-bampton"], counts, n_reference=4).sets[0]
     for point, n_modes in zip(result.points, counts, strict=True):
         data = point.record("effective-mass").data
         assert_allclose(data["carried"], carried[n_modes - 1], rtol=1e-6, atol=1e-9 * total.max())
@@ -229,7 +229,7 @@ def test_centered_directions_turn_about_the_centre_of_mass(body):
 
 def test_redundant_columns_are_named():
     """A chain of five masses along x: whatever the columns, five are independent, and four of them elastic."""
-    result = compare(cms.couple(chain(n=5)), ["craig-bampton-ir"], [2], n_reference=2).sets[0]
+    result = compare_sets(cms.couple(chain(n=5)), ["craig-bampton-ir"], [2], n_reference=2).sets[0]
     assert result.verdict != "error", result.sentence
     (point,) = result.points
     assert len(point.dropped) == point.record("dropped-columns").value
@@ -325,7 +325,7 @@ def test_crossings_tell_from_where_on_a_limit_is_kept_for_good():
 
 
 def test_the_shown_point_is_the_first_good_one(body):
-    comparison = compare(body, COMPARED[:4], (0, 4, 8, 12), n_reference=3)
+    comparison = compare_sets(body, COMPARED[:4], (0, 4, 8, 12), n_reference=3)
     assert comparison.ranking
     for result in comparison.sets:
         good = [p.n_modes for p in result.points if p.is_good]
@@ -338,7 +338,7 @@ def test_the_shown_point_is_the_first_good_one(body):
 
 
 def test_a_set_that_cannot_be_made_says_why_and_stops_no_other(body):
-    result = compare(body, ["benfield-hruda", "normal", "rubin"], [0, 4, 5000], n_reference=3)
+    result = compare_sets(body, ["benfield-hruda", "normal", "rubin"], [0, 4, 5000], n_reference=3)
     assert result.set("benfield-hruda").verdict == "error"
     assert "expected loads" in result.set("benfield-hruda").sentence
     assert [p.n_modes for p in result.set("normal").points] == [4]
@@ -350,24 +350,24 @@ def test_a_set_that_cannot_be_made_says_why_and_stops_no_other(body):
 
 def test_the_full_model_is_solved_once_and_read_after_that(body, tmp_path, caplog):
     path = tmp_path / "full.npz"
-    first = compare(body, ["rubin"], [3], n_reference=3, cache=path)
-    again = compare(body, ["rubin"], [3], n_reference=3, cache=path)
+    first = compare_sets(body, ["rubin"], [3], n_reference=3, cache=path)
+    again = compare_sets(body, ["rubin"], [3], n_reference=3, cache=path)
     assert (first.full.was_cached, again.full.was_cached) == (False, True)
     for a, b in zip(first.sets[0].points[0].records, again.sets[0].points[0].records, strict=True):
         assert_allclose(b.value, a.value, rtol=1e-9, atol=1e-12)
-    other = compare(body, ["rubin"], [3], n_reference=4, cache=path)
+    other = compare_sets(body, ["rubin"], [3], n_reference=4, cache=path)
     assert not other.full.was_cached
     path.write_bytes(path.read_bytes()[:1000])
-    torn = compare(body, ["rubin"], [3], n_reference=4, cache=path)
+    torn = compare_sets(body, ["rubin"], [3], n_reference=4, cache=path)
     assert not torn.full.was_cached
     assert "computed anew" in caplog.text
 
 
 def test_another_body_does_not_take_the_solution_of_the_first(body, tmp_path):
     path = tmp_path / "full.npz"
-    compare(body, ["rubin"], [2], n_reference=3, cache=path)
+    compare_sets(body, ["rubin"], [2], n_reference=3, cache=path)
     heavier = replace(body, M=body.M * 2.0)
-    result = compare(heavier, ["rubin"], [2], n_reference=3, cache=path)
+    result = compare_sets(heavier, ["rubin"], [2], n_reference=3, cache=path)
     assert not result.full.was_cached
 
 
@@ -386,7 +386,7 @@ def test_another_body_does_not_take_the_solution_of_the_first(body, tmp_path):
 def test_what_cannot_be_compared_is_refused(body, asked, words):
     given = {"sets": ["rubin"], "counts": [2], **asked}
     with pytest.raises(CompareError, match=words):
-        compare(body, given.pop("sets"), given.pop("counts"), **given)
+        compare_sets(body, given.pop("sets"), given.pop("counts"), **given)
 
 
 def test_a_body_without_interfaces_is_refused(body):

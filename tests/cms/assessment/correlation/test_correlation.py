@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import cms
 from cms.assessment.correlation import (
     CorrelationError,
     MeasuredModes,
@@ -14,7 +15,7 @@ from cms.assessment.correlation import (
     Parameter,
     Placement,
     comac,
-    correlate,
+    correlate_modes,
     fit_damping,
     mac,
     modes_of_body,
@@ -29,7 +30,7 @@ from cms.cli import main
 from cms.jobs import body_of_job
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
-from cms.jobs.studies import correlation_document, read_correlation, run_correlation
+from cms.jobs.studies import correlation_document
 from cms.pipeline import reduce_job
 from fe_models.foundation.documents.html import html_page
 from tests.bodies import box_mesh
@@ -93,7 +94,7 @@ def model(folder):
 
 def test_modes_of_a_stiffer_and_lighter_bar(measured, model):
     """Shapes are the same, frequencies go with sqrt(E / rho), the mass at the rows makes the shapes orthonormal."""
-    found = correlate(measured, model)
+    found = correlate_modes(measured, model)
     assert [(pair.measured, pair.computed) for pair in found.pairs] == [(k, k) for k in range(N)]
     assert_allclose([pair.mac for pair in found.pairs], 1.0, atol=1e-9)
     assert_allclose(found.errors, np.sqrt(LIGHTER / STIFFER) - 1, rtol=1e-6)
@@ -107,7 +108,7 @@ def test_a_turned_sensor_has_the_worst_comac(measured, model, rows):
     shapes = np.array(measured.shapes)
     k = len(rows) // 3
     shapes[3 * k : 3 * k + 3] = -shapes[3 * k : 3 * k + 3] * np.linspace(1, -1, N)
-    found = correlate(replace(measured, shapes=shapes), model)
+    found = correlate_modes(replace(measured, shapes=shapes), model)
     assert found.point_comac()[0][0] == rows[k] + 1000
     assert found.point_comac()[0][2] < 0.7 < found.point_comac()[1][2]
 
@@ -121,30 +122,30 @@ def test_a_test_in_other_axes_and_units(measured, model):
         shapes=np.einsum("ab,pak->pbk", A, measured.shapes.reshape(-1, 3, N)).reshape(-1, N),
     )  # fmt: skip
     placement = Placement(tuple(origin), tuple(map(tuple, A.T)))
-    assert_allclose([pair.mac for pair in correlate(turned, model, placement=placement).pairs], 1.0, atol=1e-9)
+    assert_allclose([pair.mac for pair in correlate_modes(turned, model, placement=placement).pairs], 1.0, atol=1e-9)
     with pytest.raises(CorrelationError, match="no node within"):
-        correlate(turned, model)
+        correlate_modes(turned, model)
 
 
 def test_points_by_number_by_hand_and_what_is_refused(measured, model, rows):
     named = replace(
         measured, points=np.repeat(model.numbering.nodes[rows], 3), places=np.full((3 * len(rows), 3), np.nan)
     )
-    assert len(correlate(named, model, placement=Placement(match="number")).pairs) == N
+    assert len(correlate_modes(named, model, placement=Placement(match="number")).pairs) == N
     with pytest.raises(CorrelationError, match='give match = "number"'):
-        correlate(named, model)
+        correlate_modes(named, model)
     far = np.array(measured.places)
     far[:3] += 50.0
     with pytest.raises(CorrelationError, match=f"farthest is point {rows[0] + 1000}"):
-        correlate(replace(measured, places=far), model)
+        correlate_modes(replace(measured, places=far), model)
     by_hand = {int(rows[0] + 1000): int(model.numbering.nodes[rows[0]])}
-    assert len(correlate(replace(measured, places=far), model, placement=Placement(nodes=by_hand)).pairs) == N
+    assert len(correlate_modes(replace(measured, places=far), model, placement=Placement(nodes=by_hand)).pairs) == N
     twice = np.array(measured.places)
     twice[3:6] = twice[:3]
     with pytest.raises(CorrelationError, match="all nearest to node"):
-        correlate(replace(measured, places=twice), model)
+        correlate_modes(replace(measured, places=twice), model)
     with pytest.raises(CorrelationError, match="no point 7"):
-        correlate(measured, model, placement=Placement(nodes={7: 1}))
+        correlate_modes(measured, model, placement=Placement(nodes={7: 1}))
 
 
 def test_pairs_by_hand_go_first():
@@ -184,7 +185,7 @@ def test_universal_files_of_normal_and_complex_modes(measured, specimen, rows, t
         assert_allclose(found.frequencies, specimen.frequencies[:N], rtol=1e-4)
         assert_allclose(found.damping, zeta, rtol=1e-3)
         assert_allclose(found.places, measured.places, atol=1e-9)
-        assert_allclose([pair.mac for pair in correlate(found, model).pairs], 1.0, atol=1e-6)
+        assert_allclose([pair.mac for pair in correlate_modes(found, model).pairs], 1.0, atol=1e-6)
         assert found.collinearity.size == (0 if phase is None else N)
     without = universal_text(rows, places, specimen.frequencies[:N], shapes, zeta, units=None)
     with pytest.raises(CorrelationError, match="nothing tells its unit of length"):
@@ -208,7 +209,7 @@ def test_tables_of_modes(measured, tmp_path, model):
     found = read_mode_table(write(tmp_path / "m.csv", text), 1e-3)
     assert_allclose(found.shapes, measured.shapes, rtol=1e-7, atol=1e-12)
     assert_allclose(found.damping, 0.01)
-    assert len(correlate(found, model).pairs) == N
+    assert len(correlate_modes(found, model).pairs) == N
     bad = {
         "5, q, 0, 0, 0, 1": "expected x, -y",
         "5, x, 0, 0, 1": "expected 6 values, got 5",
@@ -354,7 +355,7 @@ def test_file_command_page_and_updated_job(folder, specimen, rows, tmp_path, cap
         assert run(monkeypatch, ["correlate", str(bad)]) == 2
         assert message in capsys.readouterr().err
     plain = write(tmp_path / "plain.toml", FILE[: FILE.index("[update]")])
-    result = run_correlation(read_correlation(plain))
+    result = cms.correlate(plain)
     assert result.update is None
     assert "Orthogonality" in html_page(correlation_document(result))
 

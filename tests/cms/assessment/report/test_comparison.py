@@ -13,7 +13,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import cms
-from cms.assessment.compare.compare import compare
+from cms.assessment.compare.compare import compare_sets
 from cms.assessment.compare.comparison import SetResult
 from cms.assessment.compare.verdicts import DECIDING, crossings
 from cms.assessment.quality.limits import LIMITS
@@ -36,7 +36,7 @@ SETS = {
 
 @pytest.fixture(scope="module")
 def comparison():
-    return compare(cms.couple(bar(nx=8)), SETS, range(0, 13, 3), n_reference=4)
+    return compare_sets(cms.couple(bar(nx=8)), SETS, range(0, 13, 3), n_reference=4)
 
 
 @pytest.fixture(scope="module")
@@ -362,7 +362,7 @@ def test_the_tools_of_a_chart_lie_on_no_legend(view):
 
 
 def test_a_body_of_beams_is_drawn_by_lines_and_a_browser_without_webgl_is_told(started, tmp_path):
-    result = compare(cms.couple(beam(n=6)), ["craig-bampton"], [2], n_reference=2)
+    result = compare_sets(cms.couple(beam(n=6)), ["craig-bampton"], [2], n_reference=2)
     path = tmp_path / "beam.html"
     path.write_text(html_page(comparison_document(result, stills=0)), encoding="utf-8")
     shown, complaints = opened(started, path)

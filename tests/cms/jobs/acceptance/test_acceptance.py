@@ -22,8 +22,8 @@ from cms.body.linear_range import LINEAR, STIFFENED
 from cms.body.modal_file.file import read, write
 from cms.cli import main
 from cms.cli.verdicts.check import check_file
-from cms.jobs.acceptance import accept
-from cms.jobs.acceptance.accept import FullModel, accept_body, compare_with_model
+from cms.jobs.acceptance import accept as module_of_accept
+from cms.jobs.acceptance.accept import FullModel, accept, compare_with_model
 from cms.jobs.acceptance.document import document_of, write_acceptance
 from cms.jobs.acceptance.origin import source_files
 from cms.jobs.acceptance.range_of_use import range_of_use
@@ -50,7 +50,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def accepted(folder):
-    return accept_body(folder / "bar.h5", FullModel(job=folder / "bar.toml"))
+    return accept(folder / "bar.h5", FullModel(job=folder / "bar.toml"))
 
 
 def test_own_body_against_its_job(accepted, folder):
@@ -67,18 +67,18 @@ def test_own_body_against_its_job(accepted, folder):
 def test_the_body_is_checked_once(folder, monkeypatch):
     """By itself, and beside the full model of its job."""
     asked = []
-    for module in (accept, reduction_check):
+    for module in (module_of_accept, reduction_check):
         monkeypatch.setattr(module, "check_body", lambda reduced, of=check_body: asked.append(reduced) or of(reduced))
     for full in (FullModel(), FullModel(job=folder / "bar.toml")):
         asked.clear()
-        records = accept_body(folder / "bar.h5", full).records
+        records = accept(folder / "bar.h5", full).records
         assert len(asked) == 1
         names = [record.name for record in records]
         assert len(set(names)) == len(names)
 
 
 def test_a_file_by_itself_is_accepted_with_a_band_of_custom_only(folder):
-    found = accept_body(folder / "bar.h5")
+    found = accept(folder / "bar.h5")
     assert found.verdict == "pass"
     assert "no full model" in found.words
     assert not found.range.band.is_compared
@@ -126,7 +126,7 @@ def test_received_body_against_its_deck(folder, tmp_path):
     )
     whole = tmp_path / "whole.inp"
     whole.write_text(deck + materials)
-    found = accept_body(tmp_path / "received.h5", FullModel(deck=whole, program="abaqus"), band=9000.0)
+    found = accept(tmp_path / "received.h5", FullModel(deck=whole, program="abaqus"), band=9000.0)
     by_name = {record.name: record for record in found.records}
     assert by_name["model-mass"].verdict == "pass"
     assert by_name["frequency-error"].data["full_hz"][0] > 0
@@ -136,7 +136,7 @@ def test_received_body_against_its_deck(folder, tmp_path):
 
     heavier = tmp_path / "heavier.inp"
     heavier.write_text(deck + materials.replace(str(DENSITY), str(1.05 * DENSITY)))
-    found = accept_body(tmp_path / "received.h5", FullModel(deck=heavier, program="abaqus"), band=9000.0)
+    found = accept(tmp_path / "received.h5", FullModel(deck=heavier, program="abaqus"), band=9000.0)
     (mass,) = (record for record in found.records if record.name == "model-mass")
     assert mass.verdict == "fail"
     assert mass.value == pytest.approx(0.05 / 1.05, rel=0.05)
@@ -178,8 +178,8 @@ def test_a_received_body_whose_inner_shapes_are_garbage_is_not_accepted(folder, 
         "*SOLID SECTION, ELSET=all, MATERIAL=steel\n"
     )
     full = FullModel(deck=deck, program="calculix")
-    right = accept_body(replace(body, provenance=provenance), full, most_dofs=0, band=9000.0)
-    wrong = accept_body(replace(body, Phi=Phi, provenance=provenance), full, most_dofs=0, band=9000.0)
+    right = accept(replace(body, provenance=provenance), full, most_dofs=0, band=9000.0)
+    wrong = accept(replace(body, Phi=Phi, provenance=provenance), full, most_dofs=0, band=9000.0)
     assert right.verdict != "fail"
     failed = [{record.name for record in found.records if record.verdict == "fail"} for found in (right, wrong)]
     assert failed[1] - failed[0] - {"band-asked"} == {"mac-nodal"}
@@ -189,7 +189,7 @@ def test_a_body_that_is_not_that_of_its_job_is_not_accepted_by_name(folder, caps
     """Damping ten times that of the job, and stress in Pa in a file in MPa, for `accept --full` and `check --job`."""
     body = read(folder / "bar.h5")
     bad = replace(body, D=10 * np.asarray(body.D), stress=1e6 * np.asarray(body.stress))
-    found = accept_body(bad, FullModel(job=folder / "bar.toml"), most_dofs=0)
+    found = accept(bad, FullModel(job=folder / "bar.toml"), most_dofs=0)
     assert {record.name for record in found.records if record.verdict == "fail"} == {"damping-matrix", "stress-modes"}
     (damping,) = (record for record in found.records if record.name == "damping-matrix")
     assert "the job: ModalDamping(ratio=0.01)" in damping.reason
@@ -232,7 +232,7 @@ def test_failed_checks_come_first_and_are_not_accepted(folder):
     body = read(folder / "bar.h5")
     moments = replace(body.moments, C1=1.2 * np.asarray(body.moments.C1))
     no_picture = np.zeros((0, 3), np.int64)
-    found = accept_body(replace(body, moments=moments, surface=no_picture, numbering=Numbering()))
+    found = accept(replace(body, moments=moments, surface=no_picture, numbering=Numbering()))
     assert found.verdict == "fail"
     assert "not accepted" in found.words
     document = document_of(found)
@@ -261,8 +261,8 @@ def test_command_writes_judges_and_refuses(folder, tmp_path, capsys, monkeypatch
 
 @pytest.mark.parametrize(("share", "verdict"), [(0.99, "pass"), (1.01, "fail"), (1e9, "fail")])
 def test_a_band_beyond_that_of_custom_is_not_accepted(folder, share, verdict):
-    usable = accept_body(folder / "bar.h5").range.band.highest
-    found = accept_body(folder / "bar.h5", band=share * usable)
+    usable = accept(folder / "bar.h5").range.band.highest
+    found = accept(folder / "bar.h5", band=share * usable)
     (record,) = (record for record in found.records if record.name == "band-asked")
     assert (record.verdict, found.verdict) == (verdict, verdict)
     assert record.value == pytest.approx(share)
@@ -273,7 +273,7 @@ def test_bad_requests(folder):
     with pytest.raises(QualityError, match="got both"):
         FullModel(job=folder / "bar.toml", deck=folder / "bar.inp")
     with pytest.raises(QualityError, match="above 0"):
-        accept_body(folder / "bar.h5", band=-1.0)
+        accept(folder / "bar.h5", band=-1.0)
 
 
 def run(monkeypatch, arguments):

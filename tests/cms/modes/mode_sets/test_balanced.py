@@ -7,7 +7,7 @@ import scipy.sparse as sp
 from numpy.testing import assert_allclose
 
 import fe_models as fm
-from cms.assessment.quality.reference.port_model import file_response
+from cms.assessment.quality.reference.port_model import frf
 from cms.errors import EigenError, ModeSetError
 from cms.modes.families.families import Families
 from cms.modes.families.receptance import largest_error, receptance_of_modes
@@ -267,11 +267,11 @@ def test_a_set_for_chosen_places_needs_fewer_columns(body):
 
     def error(n, **options):
         modes = balanced_truncation(body, n_modes=n, **options)
-        found = file_response(reduce(body, modes), frequencies, damping=0.01).between("left", "right").H[:, 2, 2]
+        found = frf(reduce(body, modes), frequencies, damping=0.01).between("left", "right").H[:, 2, 2]
         return np.abs(found - exact).max() / np.abs(exact).max()
 
     unit = ModeSet("unit", np.eye(body.n_dof), tuple(map(str, range(body.n_dof))), np.full(body.n_dof, np.nan))
-    exact = file_response(reduce(body, unit), frequencies, damping=0.01).between("left", "right").H[:, 2, 2]
+    exact = frf(reduce(body, unit), frequencies, damping=0.01).between("left", "right").H[:, 2, 2]
     assert error(6, **places) < 1e-4
     assert error(6) > 1e-3
     told = balanced_truncation(body, n_modes=4, **places).options

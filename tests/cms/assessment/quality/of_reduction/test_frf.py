@@ -15,7 +15,7 @@ from cms.assessment.quality.of_reduction.frf import (
 from cms.assessment.quality.plots import frf_figure, plot_frf
 from cms.assessment.quality.reference.free_basis import free_basis
 from cms.assessment.quality.reference.full_reference import FullReference
-from cms.assessment.quality.reference.port_model import file_resonances, file_response, modal_response, port_model
+from cms.assessment.quality.reference.port_model import file_resonances, frf, modal_response, port_model
 from cms.assessment.quality.reference.ports import Ports
 from cms.assessment.quality.reference.reference_response import RESPONSE_TOLERANCE, reference_response
 from cms.modes.families.families import Families
@@ -106,7 +106,7 @@ def test_every_kind_of_interface_has_a_port(mixed):
         assert multipliers == 6
         assert_same_response(found.H, dense_response(mixed, FREQUENCIES[:4]), 3 * RESPONSE_TOLERANCE)
         modes = MODE_SETS["craig-bampton-ir"](reference.families, n_modes=25)
-        own = file_response(reduce(mixed, modes), FREQUENCIES[:3])
+        own = frf(reduce(mixed, modes), FREQUENCIES[:3])
         assert own.H.shape == (3, 18, 18)
         assert n > 100
         size = np.linalg.norm(found.H[:3], axis=(1, 2))
@@ -120,14 +120,14 @@ TURNED = TisserandFrame(origin=(0.4, 0.0, 0.1), axes=((0, 1, 0), (0, 0, 1), (1, 
 @pytest.mark.parametrize("damping", [None, 0.03])
 def test_the_response_of_a_file_does_not_depend_on_its_frame(body, frame, damping):
     reduced = reduce(body, unit_set(body), frame=frame)
-    found = file_response(reduced, FREQUENCIES, damping=damping)
+    found = frf(reduced, FREQUENCIES, damping=damping)
     assert_same_response(found.H, dense_response(body, FREQUENCIES, damping or 0.0), 1e-6)
 
 
 def test_direct_solution_and_sum_of_modes_of_a_file_agree(body):
     reduced = reduce(body, craig_bampton(body, n_modes=4), damping=ModalDamping(0.01))
     # in mean axes the modes of the file are the free-free ones, so its D is the same damping
-    own, summed = (file_response(reduced, FREQUENCIES, damping=d) for d in (None, 0.01))
+    own, summed = (frf(reduced, FREQUENCIES, damping=d) for d in (None, 0.01))
     assert_same_response(own.H, summed.H, 1e-9)
 
 
@@ -140,7 +140,7 @@ def test_a_mode_set_and_its_file_have_the_same_ports(body, reference):
 
 
 def test_low_frequencies_see_the_mass(body):
-    found = file_response(reduce(body, craig_bampton(body, n_modes=2)), np.array([1e-3]))
+    found = frf(reduce(body, craig_bampton(body, n_modes=2)), np.array([1e-3]))
     driven = found.between("left", "left")
     assert_allclose(driven.inertance[0, 0, 0].real, 1 / 15.7, rtol=1e-6)
     assert_allclose(driven.mobility[0, 0, 0], driven.H[0, 0, 0] * 2j * np.pi * 1e-3, rtol=1e-12)
@@ -148,7 +148,7 @@ def test_low_frequencies_see_the_mass(body):
 
 
 def test_the_response_is_reciprocal(body):
-    found = file_response(reduce(body, craig_bampton(body, n_modes=5), damping=ModalDamping(0.02)), FREQUENCIES)
+    found = frf(reduce(body, craig_bampton(body, n_modes=5), damping=ModalDamping(0.02)), FREQUENCIES)
     assert_allclose(found.H, found.H.transpose(0, 2, 1), rtol=0, atol=1e-10 * np.abs(found.H).max())
     there, back = found.between("left", "right"), found.between("right", "left")
     assert_allclose(there.H, back.H.transpose(0, 2, 1), rtol=0, atol=1e-10 * np.abs(found.H).max())
@@ -183,7 +183,7 @@ def test_the_error_of_a_response_falls_with_more_modes(body, reference):
 
 
 def test_the_relative_error_of_a_scaled_response_is_its_scale(body):
-    full = file_response(reduce(body, craig_bampton(body, n_modes=2)), FREQUENCIES)
+    full = frf(reduce(body, craig_bampton(body, n_modes=2)), FREQUENCIES)
     import dataclasses
 
     off = dataclasses.replace(full, H=1.25 * full.H)
@@ -193,7 +193,7 @@ def test_the_relative_error_of_a_scaled_response_is_its_scale(body):
 def test_peaks_are_the_natural_frequencies(body):
     reduced = reduce(body, craig_bampton(body, n_modes=4), damping=ModalDamping(0.002))
     f = frequency_grid(50.0, 2000.0, 4000)
-    found = file_response(reduced, f).between("left", "left")
+    found = frf(reduced, f).between("left", "left")
     top = sorted(p for p, _ in peaks(f, np.abs(found.H[:, 2, 2]))[:1])
     assert np.abs(reduced.free_frequencies / top[0] - 1).min() < 2e-3
 
@@ -201,10 +201,10 @@ def test_peaks_are_the_natural_frequencies(body):
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda r: file_response(r, np.array([0.0, 1.0])), "frequencies above 0"),
-        (lambda r: file_response(r, np.array([1.0]), damping=-0.1), "expected a ratio of 0 or more"),
+        (lambda r: frf(r, np.array([0.0, 1.0])), "frequencies above 0"),
+        (lambda r: frf(r, np.array([1.0]), damping=-0.1), "expected a ratio of 0 or more"),
         (
-            lambda r: file_response(r, np.array([1.0])).between("left", "rigt"),
+            lambda r: frf(r, np.array([1.0])).between("left", "rigt"),
             "no interface 'rigt'; did you mean 'right'",
         ),
         (lambda r: frequency_grid(10.0, 5.0), "expected 0 < lowest < highest"),
@@ -223,7 +223,7 @@ def test_the_reference_is_not_used_beyond_its_band(body, reference):
 
 
 def test_plots_show_every_curve_with_its_values(body):
-    found = file_response(reduce(body, craig_bampton(body, n_modes=2)), FREQUENCIES).between("left", "right")
+    found = frf(reduce(body, craig_bampton(body, n_modes=2)), FREQUENCIES).between("left", "right")
     ax = plot_frf({"a": found, "b": found}, 2, 2)
     assert [line.get_label() for line in ax.get_lines()] == ["a", "b"]
     assert_allclose(ax.get_lines()[0].get_ydata(), np.abs(found.H[:, 2, 2]), rtol=0)
@@ -260,7 +260,7 @@ def test_peaks_have_their_height_however_narrow_they_are(body, damping, own):
 
 
 def largest_response(reduced, frequencies, damping):
-    return np.abs(file_response(reduced, frequencies, damping=damping).H).max()
+    return np.abs(frf(reduced, frequencies, damping=damping).H).max()
 
 
 def test_an_undamped_resonance_is_approached_and_left_out():
