@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cms.cli.arguments import Journal, Workers
+from cms.cli.arguments import Journal, SetValues, Workers, changes_of
 from cms.cli.console import USER_ERROR, guarded, output_path, print_error, print_table, say, stages
 from cms.cli.outputs import PICTURES, TABLES, json_text, output_files, write_outputs
 
@@ -36,6 +36,7 @@ def sweep_command(
     ] = [],  # noqa: B006
     journal: Journal = None,
     workers: Workers = None,
+    set_values: SetValues = [],  # noqa: B006
     json: Annotated[bool, typer.Option("--json", help="Write the table as JSON, for other programs.")] = False,
 ) -> None:
     """Vary parameters of a system, by parallel workers.
@@ -48,8 +49,14 @@ def sweep_command(
 
     Example: floatframe sweep study.toml -o study.csv -o study.png
 
+    With --set, other parameters of the system have these values at all points.
+
+    Example: floatframe sweep study.toml --set length=0.4
+
     Example: floatframe sweep study.toml --workers dask://cluster:8786
     """
+    from dataclasses import replace
+
     from fe_models.foundation.tasks.workers import tasks_of
     from floatframe.design.studies.study import run_study
     from floatframe.design.studies.study_file import read_study
@@ -57,7 +64,7 @@ def sweep_command(
     from floatframe.errors import ModelError
     from floatframe.files.system_file.read_system import read_system
 
-    described = read_study(study)
+    described = replace(read_study(study), given=changes_of(set_values))
     inputs = (study, Path(described.system), *read_system(described.system)[0].files)
     kept = output_path(journal, study.with_suffix(".journal"), ModelError, overwrite_of=inputs, needs_file=True)
     default = [] if json else [study.with_suffix(".csv")]

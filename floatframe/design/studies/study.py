@@ -157,7 +157,10 @@ def run_study(
     files = read_system(study.system)[0].files
     kept = None
     if journal is not None:
-        asked = study.analysis, [p.path for p in study.parameters], [(o.of, o.take) for o in study.outputs]
+        asked = (
+            study.analysis, [p.path for p in study.parameters], [(o.of, o.take) for o in study.outputs],
+            *([sorted(study.given.items())] if study.given else ()),
+        )  # fmt: skip
         digest, source = campaign_digest(asked, files), f"the study of {study.system}"
         kept = open_task_journal(Path(journal), KIND, digest, source, ResultsError)
     campaign = Campaign(StudyPoint(sendable_study(study)), kept)
@@ -178,7 +181,7 @@ def check(study: Study, point: tuple[Any, ...]) -> None:
     """Raise if the system, a key path or an output does not exist; run in this process before the long work."""
     from floatframe.files.system_file.read_system import read_system
 
-    plain, run = read_system(study.system)
+    plain, run = read_system(study.system, study.given)
     if study.analysis in MOTIONS:
         required_run(run, study.system, begins_there=True)
     try:

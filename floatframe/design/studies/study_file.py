@@ -2,8 +2,8 @@
 
 import itertools
 import os
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -157,6 +157,7 @@ class Study:
     workers: int | str | None
     parameters: tuple[Parameter, ...]
     outputs: tuple[Output, ...]
+    given: Mapping[str, Any] = field(default_factory=dict)  #: values of other keys of the system file, at all points
 
     def points(self) -> Iterator[tuple[Any, ...]]:
         """Yield the parameter values of every point; the last parameter varies fastest."""
@@ -164,8 +165,8 @@ class Study:
         yield from itertools.product(*values) if self.is_grid else zip(*values, strict=True)
 
     def changes(self, point: tuple[Any, ...]) -> dict[str, Any]:
-        """Return the values of a point, by key path."""
-        return {parameter.path: value for parameter, value in zip(self.parameters, point, strict=True)}
+        """Return the values of a point and those that are the same at all points, by key path."""
+        return {**self.given} | {parameter.path: value for parameter, value in zip(self.parameters, point, strict=True)}
 
 
 def read_study(path: str | os.PathLike[str]) -> Study:

@@ -67,6 +67,17 @@ def test_frequencies_of_a_grid_are_those_of_the_textbook_in_its_order(folder):
     assert table.units == ("Hz",)
 
 
+def test_set_gives_other_keys_one_value_at_all_points(folder):
+    (folder / "mass.toml").write_text(STUDY.replace('[parameters.gravity]\npath = "system.gravity.1"\nvalues = '
+                                                    "[-9.81, -1.62]\n", ""))  # fmt: skip
+    words = "-j", 1, "--set", "system.gravity=[0, -1.62, 0]"
+    record = json.loads(sweep(folder / "mass.toml", *words, "--json"))
+    found = [point["outputs"]["swing"] for point in record["points"]]
+    assert_allclose(found, [swing_of(mass, 1.62) for mass in (1.0, 2.0, 4.0)], rtol=1e-8)
+    assert "another system, other parameters" in sweep(folder / "mass.toml", "-j", 1, code=2)
+    assert "did you mean" in sweep(folder / "mass.toml", "--set", "system.gravty=1", "--journal", folder / "x", code=2)
+
+
 @pytest.mark.long  # with processes alone below; what a cluster does with tasks: tests/fe_models/foundation/tasks
 def test_points_of_a_cluster_give_the_table_of_this_process(folder):
     pytest.importorskip("distributed")
