@@ -1,5 +1,6 @@
 """Multifrontal Cholesky factorisation, in memory or with the factor on disk."""
 
+import logging
 import os
 import tempfile
 import threading
@@ -17,6 +18,8 @@ from fe_models.foundation.ranks.trim import give_back
 from fe_models.foundation.threads import n_threads, one_blas_thread
 
 __all__ = ["CholeskyFactor", "Panels", "PanelsInFile", "PanelsInMemory"]
+
+log = logging.getLogger(__name__)
 
 
 # storage of the columns of a factor for the solves: in memory, or in a file that vanishes with the process ------------
@@ -151,7 +154,13 @@ class CholeskyFactor:
         self.is_open = False
         if not definite:
             raise FactorizationError("cholesky: expected a positive definite matrix; take superlu for others")
+        from fe_models.foundation.compilation import announced_compilation
+
         self.n = lower.shape[0]
+        with announced_compilation(log, "the code of the Cholesky factorisation (about 20 s)"):
+            self._make(lower, fronts, on_disk, folder)
+
+    def _make(self, lower: sp.csc_array, fronts: Fronts | None, on_disk: bool, folder: Path | None) -> None:
         try:
             self._fronts = analyse(lower) if fronts is None else fronts
         except MemoryError as error:

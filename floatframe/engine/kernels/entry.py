@@ -5,12 +5,12 @@ There is one entry, because numba compiles and links all inner functions again f
 
 import logging
 from collections.abc import Callable
-from threading import Timer
 from typing import Any, NamedTuple
 
 from numba import types
 
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.compilation import announced_compilation
 from floatframe.engine.kernels.compiler.choice import compiler, words
 from floatframe.engine.kernels.compiler.compilation import kept_entry
 from floatframe.engine.kernels.compiler.sources import source_digest
@@ -48,18 +48,6 @@ __all__ = [
 ]
 
 log = logging.getLogger(__name__)
-
-PATIENCE = 1.0  #: time after which a compilation that is under way is announced [s]
-
-
-def announce() -> None:
-    """Log that the code of motions is being compiled."""
-    log.warning(
-        "compiling the code of motions (%s): once on this machine, about 15 s, some minutes with plain numba; the "
-        "command `floatframe prepare` does it in advance",
-        words(),
-    )
-
 
 LINEARIZE, RATES, CORRECT, OBSERVE, ADVANCE, COUNT = range(6)
 
@@ -160,27 +148,16 @@ class CompiledEntry:
 
         Without a call of this function, this happens at the first request.
         """
-        before = self.cache_misses
+        before = sum(self.compiled.stats.cache_misses.values())
         self.compiled.compile(self.signature)
         self.is_ready = True
-        return self.cache_misses > before
-
-    @property
-    def cache_misses(self) -> int:
-        """Number of compilations so far, with one that is under way; code from the cache does not count."""
-        return sum(self.compiled.stats.cache_misses.values())
+        return sum(self.compiled.stats.cache_misses.values()) > before
 
     def __call__(self, *records: Any, memory: Any = NO_MEMORY, rows: Any = NO_ROWS, **order: float) -> Outcome:
         """Carry out a request; fields that are not given are zero, and all arrays stay alive until it returns."""
         if not self.is_ready:
-            misses = self.cache_misses
-            announcement = Timer(PATIENCE, lambda: announce() if self.cache_misses > misses else None)
-            announcement.daemon = True
-            announcement.start()
-            try:
+            with announced_compilation(log, f"the code of motions (about 15 s; {words()})"):
                 self.prepare()
-            finally:
-                announcement.cancel()
         ordered, numbers = table_of_numbers(ORDER, order)
         outcome = self.compiled(*(record.table for record in (*records, memory, rows)), ordered)
         del numbers  # must live until here, because the table has its address

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 import scipy.sparse as sp
+from numba.core.event import trigger_event
 from numpy.testing import assert_allclose, assert_array_equal
 
 import cms
@@ -249,3 +250,18 @@ def test_no_memory_is_told_as_by_other_solvers(monkeypatch):
     monkeypatch.setattr(CholeskyFactor, "_factorise", without)
     with pytest.raises(FactorRoomError, match=r"cholesky: not enough memory; n = 64, \d+ entries"):
         CholeskyFactor(lower_triangle(grid(4)))
+
+
+def test_the_compilation_of_the_kernels_is_announced_once(monkeypatch, caplog):
+    def compiled_before(lower):
+        for _ in range(2):
+            with trigger_event("numba:compile"):
+                pass
+        return analyse(lower)
+
+    A = lower_triangle(grid(6))
+    CholeskyFactor(A).close()
+    assert caplog.messages == []
+    monkeypatch.setattr("cms.linear_algebra.sparse_cholesky.factor.analyse", compiled_before)
+    CholeskyFactor(A).close()
+    assert [message[:38] for message in caplog.messages] == ["the code of the Cholesky factorisation"]
