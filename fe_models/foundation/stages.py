@@ -1,12 +1,13 @@
-"""Stages of a long computation: progress of each stage, and its duration in seconds."""
+"""Stages of a long computation: progress and duration of each, and the announcement of a compilation."""
 
+import logging
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
-__all__ = ["Stages"]
+__all__ = ["Stages", "announced_compilation"]
 
 
 @dataclass(eq=False)
@@ -32,3 +33,26 @@ class Stages:
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - begin
         if self.show is not None:
             self.show.update(task, total=1.0, completed=1.0)
+
+
+@contextmanager
+def announced_compilation(log: logging.Logger, message: str) -> Iterator[None]:
+    """Log a warning when numba begins to compile inside the block; code that it loads from its cache does not count."""
+    from numba.core.event import Event, Listener, install_listener
+
+    class Announcement(Listener):
+        is_made = False
+
+        def on_start(self, event: Event) -> None:
+            if not self.is_made:
+                self.is_made = True
+                log.warning(
+                    "%s is being compiled, once on this machine; the command `floatframe prepare` does it in advance",
+                    message,
+                )
+
+        def on_end(self, event: Event) -> None:
+            pass
+
+    with install_listener("numba:compile", Announcement()):
+        yield

@@ -130,7 +130,7 @@ def export_command(
 
 
 @dataclass(frozen=True)
-class Target:
+class ExportTarget:
     """A form that `floatframe export` writes; the keyword arguments of `write` are its options."""
 
     write: Callable[..., None]
@@ -387,12 +387,15 @@ RESULTS, SYSTEM = "a results file (.h5)", "a system file (.toml)"
 SIGNALS = (".rsp", ".drv", ".tim", ".rpc")
 
 #: targets by name
-TARGETS: dict[str, Target] = {
-    **{each[1:]: Target(partial(write_table, ending=each), (each,), RESULTS) for each in TABLES},
-    "rpc": Target(write_signals, SIGNALS, RESULTS),
-    "vtk": Target(write_surfaces, (".pvd",), RESULTS),
-    "urdf": Target(write_robot, (".urdf",), SYSTEM),
-    "fmu": Target(write_unit, (".fmu",), SYSTEM),
-    "fmu-c": Target(write_compiled_unit, (".fmu",), SYSTEM),
-    **{each: Target(partial(write_code, language=each), (), SYSTEM) for each in ("c", "python", "casadi", "matlab")},
+TARGETS: dict[str, ExportTarget] = {
+    **{each[1:]: ExportTarget(partial(write_table, ending=each), (each,), RESULTS) for each in TABLES},
+    "rpc": ExportTarget(write_signals, SIGNALS, RESULTS),
+    "vtk": ExportTarget(write_surfaces, (".pvd",), RESULTS),
+    "urdf": ExportTarget(write_robot, (".urdf",), SYSTEM),
+    "fmu": ExportTarget(write_unit, (".fmu",), SYSTEM),
+    "fmu-c": ExportTarget(write_compiled_unit, (".fmu",), SYSTEM),
+    **{
+        each: ExportTarget(partial(write_code, language=each), (), SYSTEM)
+        for each in ("c", "python", "casadi", "matlab")
+    },
 }

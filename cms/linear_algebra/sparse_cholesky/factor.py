@@ -15,6 +15,7 @@ from cms.linear_algebra.sparse_cholesky.analysis import Fronts, analyse, inverse
 from cms.linear_algebra.sparse_cholesky.blocks import blocks_of, for_each
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.ranks.trim import give_back
+from fe_models.foundation.stages import announced_compilation
 from fe_models.foundation.threads import n_threads, one_blas_thread
 
 __all__ = ["CholeskyFactor", "Panels", "PanelsInFile", "PanelsInMemory"]
@@ -154,8 +155,6 @@ class CholeskyFactor:
         self.is_open = False
         if not definite:
             raise FactorizationError("cholesky: expected a positive definite matrix; take superlu for others")
-        from fe_models.foundation.compilation import announced_compilation
-
         self.n = lower.shape[0]
         with announced_compilation(log, "the code of the Cholesky factorisation (about 20 s)"):
             self._make(lower, fronts, on_disk, folder)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from numba import types
 
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.compilation import announced_compilation
+from fe_models.foundation.stages import announced_compilation
 from floatframe.engine.kernels.compiler.choice import compiler, words
 from floatframe.engine.kernels.compiler.compilation import kept_entry
 from floatframe.engine.kernels.compiler.sources import source_digest

@@ -289,7 +289,7 @@ class Unit:
         arrays = joint_rows(self.system, [rows_of_file(compiled_system(self.system), self.row)])
         motion = Trajectory(self.head, MemorySource(arrays), is_complete=False)
         found = [(sensor.measure(self.system, motion), column) for sensor, column in self.sensors]
-        return [one.taken(column) if column else one for one, column in found]
+        return [one.alone(column) if column else one for one, column in found]
 
     def values(self) -> dict[str, float]:
         """Return the outputs by name "sensor.column"."""

@@ -191,7 +191,7 @@ def measurement_of(system: System, trajectory: Trajectory, name: str) -> Measure
     """
     sensor, column = sensor_and_column(system, name)
     whole = measured(system, trajectory, [sensor])[sensor.name]
-    return whole.taken(column, name) if column else whole
+    return whole.alone(column, name) if column else whole
 
 
 # descriptions of the points that sensors use: the requested place, the node used for it, and their distance -----------

@@ -93,7 +93,7 @@ class Measurement:
             raise ModelError(f"sensor {self.sensor!r}: no column {quoted(column)}{nearest(column, list(self.columns))}")
         return column
 
-    def taken(self, column: str, name: str = "") -> "Measurement":
+    def alone(self, column: str, name: str = "") -> "Measurement":
         """Return the measurement of one column alone, under a name; "": that of the sensor."""
         column = self.only(column)
         return replace(
