@@ -47,7 +47,7 @@ class SystemVibrations:
     n_free
         Number of motions without stiffness.
     n_unstable
-        Number of motions with negative stiffness: the state is no minimum of the potential energy.
+        Number of motions with negative stiffness, for which the state is not a minimum of the potential energy.
     """
 
     frequencies: Array

@@ -39,7 +39,7 @@ class EnergyMomentum(DiscreteScheme):
     Parameters
     ----------
     tolerance
-        Largest last correction over the increments of the step.
+        Largest last correction relative to the increments of the step.
     max_iterations
         Largest number of Newton iterations in a step.
 
@@ -87,7 +87,7 @@ class EnergyDecaying(DiscreteScheme):
     rho_inf
         Spectral radius of modes with frequencies far above 1/h, 0 <= rho_inf <= 1; 1 gives `EnergyMomentum`.
     tolerance
-        Largest last correction over the increments of the step.
+        Largest last correction relative to the increments of the step.
     max_iterations
         Largest number of Newton iterations in a step.
 

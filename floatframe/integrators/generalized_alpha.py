@@ -55,7 +55,7 @@ class GeneralizedAlpha(Integrator):
     """Generalized-alpha for index-3 equations of motion on a Lie group [1]_ [2]_, second order.
 
     (1) predict: a_new = a
-    (2) Newton on  M u_dot - Jᵀ w = f, g = 0  over the increment x of the step, where
+    (2) Newton's method for  M u_dot - Jᵀ w = f, g = 0  in the increment x of the step, where
         x = h u + h² ((1/2 - beta) a + beta a_new),  r + x_r, R exp(x_theta), q + x_q
         u_new = u + h ((1 - gamma) a + gamma a_new)
     (3) (1 - alpha_m) a_new + alpha_m a = (1 - alpha_f) u_dot_new + alpha_f u_dot

@@ -41,8 +41,8 @@ class RelativeGeneralizedAlpha(Integrator):
     """Generalized-alpha in coordinates of joints and modes (docs/relative.md §6), otherwise as `GeneralizedAlpha`.
 
     (1) predict: a_new = a for every unknown s = (z, q)
-    (2) Newton on  rho(s, s_dot, s_ddot, w) = 0, g = 0  over the increment x of the step, where rho is the residual
-        projected along the coordinates, g the equations of loops, couplers and force elements, and
+    (2) Newton's method for  rho(s, s_dot, s_ddot, w) = 0, g = 0  in the increment x of the step, where rho is the
+        residual projected along the coordinates, g the equations of loops, couplers and force elements, and
         x = h s_dot + h² ((1/2 - beta) a + beta a_new),  Q exp(x) for rotations
         s_dot_new = s_dot + h ((1 - gamma) a + gamma a_new)
     (3) (1 - alpha_m) a_new + alpha_m a = (1 - alpha_f) s_ddot_new + alpha_f s_ddot

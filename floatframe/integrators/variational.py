@@ -43,7 +43,7 @@ class Variational(DiscreteScheme):
     Parameters
     ----------
     tolerance
-        Largest last correction over the increments of the step.
+        Largest last correction relative to the increments of the step.
     max_iterations
         Largest number of Newton iterations in a step.
 

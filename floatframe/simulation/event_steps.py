@@ -109,7 +109,7 @@ class EventWatch:
     made: dict[tuple, System] = field(init=False, default_factory=dict)
     events: tuple[Event, ...] = field(init=False)  #: events of the system, of its stops and of its switching functions
     off: frozenset[str] = field(init=False)  #: names of forces, couplers and elements that are off
-    caught: dict[str, float] = field(default_factory=dict)  #: values at which engaged couplers are held
+    caught: dict[str, float] = field(default_factory=dict)  #: values at which engaged couplers are fixed
     #: limit, "lower" or "upper", at which each stopped coupler rests
     resting: dict[str, str] = field(default_factory=dict)
     signs: dict[str, int] = field(default_factory=dict)  #: present sign of each switching function, by event

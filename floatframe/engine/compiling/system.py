@@ -282,7 +282,7 @@ def compiled_system(system: System) -> CompiledSystem:
     Raises
     ------
     ModelError
-        If a joint or force names what does not exist, or has two markers on one body.
+        If a joint or force names an object that does not exist, or has two markers on one body.
     """
     return system.derived(compile_system)
 
@@ -293,7 +293,7 @@ def compile_system(system: System) -> CompiledSystem:
     Raises
     ------
     ModelError
-        If a joint or force names what does not exist, or has two markers on one body.
+        If a joint or force names an object that does not exist, or has two markers on one body.
     """
     require_inertia(system.bodies)
     axes = tuple(body.mean_axes if isinstance(body, FlexibleBody) else None for body in system.bodies)

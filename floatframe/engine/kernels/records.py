@@ -215,7 +215,7 @@ def measured(declaration: Record, record: Record) -> dict[str, int]:
     Raises
     ------
     ValueError
-        If an array is not what is declared, or has another size than the arrays before it.
+        If an array does not agree with its declaration, or with the sizes of earlier arrays.
     """
     sizes: dict[str, int] = {}
     where = type(declaration).__name__

@@ -6,7 +6,7 @@ same in A, B and C,
 
     e = Cᵀ d,  xi = (e, theta),  (f, m) = dV/dxi + D xi_dot,  V = 1/2 xiᵀ K xi + preload · xi + tables of each xi_i
 
-Variations seen from A in the axes of C, u the rotation of B, t = |theta|:
+Variations relative to A in the axes of C, with u the rotation of B and t = |theta|:
 
     dtheta = S u,   S = alpha 1 + beta theta thetaᵀ + sigma tilde(theta),   beta = (1 - alpha)/t²
         axes of A, B: alpha = (t/2) cot(t/2), sigma = -1/2, 1/2;   half way: alpha = (t/2)/sin(t/2), sigma = 0

@@ -1,6 +1,6 @@
 """Rows of free coordinates along which forces act: PUSH, TWIST and TWIST_B, with the residual e · part + Q.
 
-With e the axis, d = r_B - r_A, s the slip of B seen from A and n the size of the force normal to e:
+With e the axis, d = r_B - r_A, s the slip of B relative to A and n the absolute value of the force normal to e:
 
     PUSH   dx = e · (dr_B - dr_A) + (e × d) · dphi_A
            dv = e · (dv_B - dv_A) + (e × d) · domega_A - (e × omega_A) · (dr_B - dr_A) + (e × s) · dphi_A
@@ -21,7 +21,7 @@ __all__ = ["loaded_derivatives", "loaded_value", "normal_force"]
 
 @inner
 def normal_force(w, e):
-    """Return the size of the force normal to the axis, and the force component along the axis."""
+    """Return the absolute value of the force normal to the axis, and the force component along the axis."""
     F = vector(w)
     along = dot(e, F)
     return math.sqrt(max(dot(F, F) - along * along, 0.0)), along

@@ -211,7 +211,7 @@ def put_rows(dense, k, v, S, m, s, J):
 
 @loops
 def change_of_wrench(dense, k, S, change, m, s, J):
-    """Return the wrench change of subtree k for S with Y, X: seen from the ground, by position, by rate (3)."""
+    """Return the wrench changes of subtree k for S with Y, X, in ground axes: by position and by rate (3)."""
     p, Q, f, t = vector(dense.momentum[k]), dense.Q[k], vector(dense.wrench[k]), vector(dense.wrench[k, 3:])
     v, w = vector(S), vector(S[3:])
     f_z, t_z = wrench_of(m, s, J, p, Q, vector(change[6:]), vector(change[9:]), vector(change[3:]))
