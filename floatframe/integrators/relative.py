@@ -18,10 +18,11 @@ from floatframe.engine.initial_conditions.step_filter import Beginning, Spin
 from floatframe.engine.kernels.entry import Outcome
 from floatframe.engine.kernels.memory import Memory, Rows
 from floatframe.engine.kernels.model import Model
-from floatframe.engine.kernels.work import Work, new_work
+from floatframe.engine.kernels.work import Work
 from floatframe.engine.tree.formulation import is_relative
 from floatframe.engine.tree.kernels.tree import JointWork, TangentWork, Tree, new_joint_work, new_tangent_work
 from floatframe.engine.tree.topology import tree_of
+from floatframe.engine.tree.tree_motions import joint_iterate
 from floatframe.errors import ModelError
 from floatframe.integrators.generalized_alpha import LONGER, GeneralizedAlpha, rows_closed_by_positions, words_of_turn
 from floatframe.integrators.integrator import Failure, Integrator, started_anew
@@ -220,16 +221,6 @@ def kept_of(work: Work, model: Model, tree: Tree) -> Kept:
         weakref.finalize(work.solver.pivot, KEPT.pop, key, None)
         work.solver.is_due[...] = 1
     return KEPT[key]
-
-
-def joint_iterate(compiled: CompiledSystem, tree: Tree, state: State, u_dot: Array) -> tuple[Work, JointWork]:
-    """Return working arrays with the joint motion at a state."""
-    from floatframe.engine.tree.kernels.entry import motion_of_joints
-
-    work, joints = new_work(compiled.model), new_joint_work(compiled.model, tree)
-    set_iterate(work, state, u_dot)
-    motion_of_joints(compiled.model, work, tree, joints)
-    return work, joints
 
 
 def in_slots(tree: Tree, joints: JointWork, of_bodies: Array, of_columns: Array) -> Array:

@@ -13,12 +13,12 @@ import numpy as np
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.words import quoted
 from floatframe.engine.compiling.system import compiled_system
-from floatframe.engine.initial_conditions.newton_equations import set_iterate
 from floatframe.engine.kernels.model import Model
 from floatframe.engine.kernels.work import new_work
-from floatframe.engine.tree.kernels.entry import motion_of_joints, moved
-from floatframe.engine.tree.kernels.tree import JointWork, Tree, new_joint_work
+from floatframe.engine.tree.kernels.entry import moved
+from floatframe.engine.tree.kernels.tree import JointWork, Tree
 from floatframe.engine.tree.topology import SystemTree, tree_of
+from floatframe.engine.tree.tree_motions import joint_iterate
 from floatframe.errors import ModelError
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.system import System
@@ -139,10 +139,8 @@ def marker_places(model: Model, m: int, r: Array, R: Array) -> Array:
 
 def joints_as_placed(system: System) -> JointWork:
     """Return working arrays for the tree joints in the placed configuration."""
-    tree, compiled = tree_of(system).tree, compiled_system(system)
-    model, work, joints = compiled.model, new_work(compiled.model), new_joint_work(compiled.model, tree)
-    set_iterate(work, compiled.placed, None, None)
-    motion_of_joints(model, work, tree, joints)
+    compiled = compiled_system(system)
+    _, joints = joint_iterate(compiled, tree_of(system).tree, compiled.placed)
     joints.d_start[:], joints.Q_start[:] = joints.d, joints.Q
     return joints
 
