@@ -24,18 +24,16 @@ from floatframe.engine.kernels.compiler.compilation import inner, loops, matrix_
 from floatframe.engine.kernels.evaluation import tangent_of_body
 from floatframe.engine.kernels.vector import (
     add,
+    congruent,
     cross,
     matrix,
-    matrix_sum,
     product,
     put,
-    put_block,
     put_column,
     put_matrix,
     scaled,
     scaled_matrix,
     sub,
-    tilde,
     transposed,
     turned,
     turned_back,
@@ -45,6 +43,7 @@ from floatframe.engine.kernels.vector import (
 from floatframe.engine.tree.kernels.kinematics import column_screw
 from floatframe.engine.tree.kernels.mode_screws import mode_screw
 from floatframe.engine.tree.kernels.projection import subtract_slopes
+from floatframe.engine.tree.kernels.spatial import put_blocks, shifted_blocks
 
 __all__ = ["factorize_poses", "keep_bodies", "solve_kept"]
 
@@ -225,16 +224,10 @@ def upper_part(F, row, column):
 @loops
 def move_inwards(F, turn, shift, P):
     """Write Adᵀ P Ad, the remainder of a front transformed to axes and origin of the parent."""
-    o, R, arm = F.shape[0] - 6, matrix(turn), tilde(vector(shift))
-    back, minus = transposed(R), scaled_matrix(-1.0, arm)
-    vv = product(product(R, upper_part(F, o, o)), back)
-    vw = product(product(R, upper_part(F, o, o + 3)), back)
-    ww = product(product(R, upper_part(F, o + 3, o + 3)), back)
-    wv = matrix_sum(transposed(vw), product(arm, vv))
-    put_block(P, 0, 0, vv)
-    put_block(P, 3, 0, wv)
-    put_block(P, 0, 3, transposed(wv))
-    put_block(P, 3, 3, matrix_sum(ww, matrix_sum(product(arm, vw), product(wv, minus))))
+    o, R = F.shape[0] - 6, matrix(turn)
+    A, B = congruent(R, upper_part(F, o, o)), congruent(R, upper_part(F, o, o + 3))
+    A, B, C = shifted_blocks(A, B, congruent(R, upper_part(F, o + 3, o + 3)), vector(shift))
+    put_blocks(P, A, B, C)
 
 
 @matrix_loops

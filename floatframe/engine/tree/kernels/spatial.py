@@ -1,13 +1,29 @@
 """Spatial vectors as pairs ((3,), (3,)): translation of the point at a fixed origin, and rotation."""
 
-from floatframe.engine.kernels.compiler.compilation import inner, small
-from floatframe.engine.kernels.vector import add, cross, dot, put, scaled, sub, turned, vector
+from floatframe.engine.kernels.compiler.compilation import inner, loops, small
+from floatframe.engine.kernels.vector import (
+    add,
+    cross,
+    dot,
+    matrix_sum,
+    product,
+    put,
+    put_block,
+    scaled,
+    sub,
+    tilde,
+    transposed,
+    turned,
+    vector,
+)
 
 __all__ = [
     "pair",
     "pair_sum",
+    "put_blocks",
     "put_pair_of",
     "scaled_pair",
+    "shifted_blocks",
     "spatial_cross",
     "spatial_motion",
     "turned_power",
@@ -59,6 +75,23 @@ def world_screw(R, p, S):
     """Return, in ground axes about the origin, a spatial vector given in axes R about point p."""
     ang = turned(R, S[1])
     return add(turned(R, S[0]), cross(p, ang)), ang
+
+
+@small
+def put_blocks(H, A, B, C):
+    """Write a symmetric matrix of motions, [A B; Bᵀ C], into the first rows and columns of H."""
+    put_block(H, 0, 0, A)
+    put_block(H, 0, 3, B)
+    put_block(H, 3, 0, transposed(B))
+    put_block(H, 3, 3, C)
+
+
+@loops
+def shifted_blocks(A, B, C, p):
+    """Shift blocks A, B, C by p, from new to old point: A, B - A p~, C + p~ (B - A p~) - Bᵀ p~."""
+    minus = tilde(scaled(-1.0, p))
+    B_p = matrix_sum(B, product(A, minus))
+    return A, B_p, matrix_sum(C, matrix_sum(product(tilde(p), B_p), product(transposed(B), minus)))
 
 
 @small

@@ -32,6 +32,7 @@ from floatframe.engine.kernels.vector import (
     turned,
     vector,
 )
+from floatframe.engine.tree.kernels.spatial import shifted_blocks
 from floatframe.engine.tree.recursion.composite import (
     add_carried,
     along,
@@ -39,7 +40,6 @@ from floatframe.engine.tree.recursion.composite import (
     flexible_column,
     moments_in_ground,
     rigid_blocks,
-    shifted_blocks,
 )
 
 __all__ = ["articulate", "solve_articulated", "solve_columns"]

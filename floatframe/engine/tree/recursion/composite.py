@@ -21,10 +21,7 @@ from floatframe.engine.kernels.vector import (
     cross,
     dot,
     matrix,
-    matrix_sum,
-    product,
     put,
-    put_block,
     put_column,
     put_matrix,
     put_sum,
@@ -36,6 +33,7 @@ from floatframe.engine.kernels.vector import (
     vector,
 )
 from floatframe.engine.tree.kernels.body_jets import moments_of_body
+from floatframe.engine.tree.kernels.spatial import put_blocks, shifted_blocks
 
 __all__ = [
     "add_carried",
@@ -47,7 +45,6 @@ __all__ = [
     "mass_matrix",
     "moments_in_ground",
     "rigid_blocks",
-    "shifted_blocks",
     "times_inertia",
 ]
 
@@ -82,10 +79,7 @@ def flexible_mass(nodes, work, model, marker_work, k):
     H = work.H[nodes.h0[k] : nodes.h0[k + 1]].reshape((6 + n, 6 + n))
     H[:, :] = 0.0
     A, B, C = rigid_blocks(work.mass[k], vector(work.s[k]), matrix(work.J[k]))
-    put_block(H, 0, 0, A)
-    put_block(H, 0, 3, B)
-    put_block(H, 3, 0, transposed(B))
-    put_block(H, 3, 3, C)
+    put_blocks(H, A, B, C)
     first = marker_work.bodies.C1[3 * q0 : 3 * (q0 + n)]
     W, second, R = marker_work.bodies.W[9 * q0 : 9 * (q0 + n)], block(types, t, C2, 3 * n), work.R_G[k]
     for j in range(n):
@@ -107,15 +101,6 @@ def times_inertia(m, s, J, v, w):
 def rigid_blocks(m, s, J):
     """Return blocks A, B, C of a composite body (m, s, J), where f = A v + B w and t = Bᵀ v + C w."""
     return ((m, 0.0, 0.0), (0.0, m, 0.0), (0.0, 0.0, m)), tilde(scaled(-1.0, s)), J
-
-
-@loops
-def shifted_blocks(A, B, C, p):
-    """Shift blocks A, B, C by p, from new to old point: A, B - A p~, C + p~ (B - A p~) - Bᵀ p~."""
-    P = tilde(p)
-    B_p = matrix_sum(B, product(A, tilde(scaled(-1.0, p))))
-    C_p = matrix_sum(C, matrix_sum(product(P, B_p), product(transposed(B), tilde(scaled(-1.0, p)))))
-    return A, B_p, C_p
 
 
 @loops
