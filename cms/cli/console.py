@@ -113,8 +113,8 @@ def register(app: typer.Typer, groups: Mapping[str, Mapping[str, Callable[..., N
 def commands(name: str, help: str, *, hints: Mapping[str, str] | None = None) -> typer.Typer:
     """Return an application with the options --version and --debug.
 
-    hints: what to use in place of commands that this program does not have, by name; FILE or NAME stands for the
-    arguments.
+    `hints` gives, by name, the commands to use in place of commands that this program does not have. FILE or NAME in
+    them is replaced by the arguments.
     """
     known = hints or {}
 

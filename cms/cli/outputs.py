@@ -88,7 +88,7 @@ def write_outputs(
     table
         Returns the table, for `TABLES`.
     record
-        Plain types, for .json; None: the table.
+        Result in plain types, for .json; None: the table is written.
     document
         Returns the document, for `DOCUMENTS`.
     figure
@@ -96,7 +96,7 @@ def write_outputs(
     dpi
         Resolution of a .png.
     others
-        Functions by ending that return the bytes of a path, or those of several paths; they come before the rest.
+        Functions, by suffix, that return the bytes of a path or of several paths; these files are written first.
     is_quiet
         Whether the names of the files are not printed.
     """

@@ -212,9 +212,10 @@ def on_ranks(question: Callable[[], Sequence[Path | str]], work: Callable[[], No
     Parameters
     ----------
     question
-        Returns texts, and files whose content counts; called on every rank. An error on all ranks is that of rank 0.
+        Function that every rank calls. It returns texts and paths of files, whose content is compared. An error that
+        is the same on all ranks is raised on rank 0.
     work
-        Called on rank 0.
+        Function that only rank 0 calls.
 
     Raises
     ------

@@ -27,7 +27,7 @@ __all__ = ["SplitRequest", "direction_of", "places_of", "split_job"]
 log = logging.getLogger(__name__)
 
 CUT_KINDS = ("rigid", "distributing")
-COORDINATE = 1e-9  #: largest difference between coordinates of one node, over the mesh size
+COORDINATE = 1e-9  #: largest difference between coordinates of one node, divided by the mesh size
 
 
 @dataclass(frozen=True)
@@ -290,7 +290,8 @@ def edit_job(
 def edit_reduction(reduction: Any, job: Job, interfaces: list[str]) -> None:
     """Remove entries about interfaces of other parts; replace a nodal frame by mean axes.
 
-    Neighbours hold the parts at both ends. With geometric stiffness, a frame clamped at one end would be inaccurate.
+    Neighbours hold the parts at both ends. With geometric stiffness, a frame attached at only one end would be
+    inaccurate.
     """
     for key in ("free", "loads"):
         if key in reduction:

@@ -1,29 +1,30 @@
 """Damping of the parts of a body such that the joined body keeps the damping ratios of its modes.
 
 Ratios need D = M Phi diag(2 zeta omega) Phiᵀ M, which couples nodes of different parts. A part can only damp its own
-strain. Phi_p are the modes of the whole body in part p. H_p = Lambda^-1/2 Phi_pᵀ K_p Phi_p Lambda^-1/2 has the sum 1
-over the parts. With H_p = R_pᵀ R_p, the columns of S_p = Phi_p Lambda^-1/2 R_p⁺ are patterns of unit energy, and
+strain. Phi_p are the modes of the whole body in part p. The matrices H_p = Lambda^-1/2 Phi_pᵀ K_p Phi_p Lambda^-1/2 of
+all parts add up to 1. With H_p = R_pᵀ R_p, the columns of S_p = Phi_p Lambda^-1/2 R_p⁺ are strain patterns of unit
+energy, and
 
     D_p = beta K_p + K_p S_p (Y_p - beta) S_pᵀ K_p
     phi_iᵀ D phi_j = omega_i omega_j (Σ_p R_pᵀ Y_p R_p)_ij,    wanted: diag(c), c_k = 2 zeta_k / omega_k
 
-so matrices Y_p, symmetric, with eigenvalues from beta to `MOST` max(c), are sought with (Σ_p R_pᵀ Y_p R_p)_kk = c_k.
-Beside the patterns the strain of a part is damped by beta, half of the smallest c.
+Symmetric matrices Y_p with eigenvalues from beta to `MOST` max(c) are sought such that (Σ_p R_pᵀ Y_p R_p)_kk = c_k.
+Strain of a part outside the patterns is damped by beta, half of the smallest c.
 
 (1) condense each part to its cuts and its lowest modes with fixed cuts (Craig-Bampton), and join the parts
-(2) modes of the joined body, held where its nodal frame is attached, and their wanted ratios
+(2) compute the modes of the joined body, fixed where its nodal frame is attached, and their required ratios
 (3) H_p and R_p
-(4) start: Y_p = Z Zᵀ, Z = R_p⁺ᵀ diag(sqrt(c)) R_pᵀ, is exact with all terms i, j, but can be large where the strains of
-    modes are alike in a part; its eigenvalues are clipped to the bounds
-(5) accelerated projected gradients for the terms i = i
-(6) if there is no solution, the strains of some modes are too alike in all parts: go on without the highest mode, from
-    the best Y_p so far
-(7) ratios of the joined body: complex eigenvalues with all its coordinates
-(8) damping couples these modes with higher ones, which takes up to some percent from their ratios: correct c, fit again
+(4) start from Y_p = Z Zᵀ, Z = R_p⁺ᵀ diag(sqrt(c)) R_pᵀ. It is exact in all terms i, j, but can be large where the
+    strains of modes are similar in a part; clip its eigenvalues to the bounds
+(5) fit the terms i = j with accelerated projected gradients
+(6) if there is no solution, the strains of some modes are too similar in all parts: omit the highest mode and continue
+    from the best Y_p so far
+(7) compute the ratios of the joined body from its complex eigenvalues with all its coordinates
+(8) damping couples these modes with higher ones, which lowers their ratios by up to a few percent: correct c, fit again
 
-The bound keeps the damping of the strain of any part below `MOST` times that which the mode with the largest c needs.
-Without it, the solution damps the modes above those wanted so strongly that they hold the lower ones and change their
-ratios.
+Because of the bound, the strain of no part is damped more than `MOST` times as much as the mode with the largest c
+needs. Without the bound, the solution damps the higher modes so strongly that they restrain the lower ones and change
+their ratios.
 """
 
 from collections.abc import Callable, Sequence
@@ -42,21 +43,21 @@ from fe_models.meshes.split import cut_name
 
 __all__ = ["ModeInParts", "PartsDamping", "damping_of_parts"]
 
-BAND = 6.0  #: highest frequency, over the first of the whole body, up to which modes keep their damping ratios
+BAND = 6.0  #: modes keep their damping ratios up to this multiple of the first frequency of the whole body
 FEWEST_MODES, MOST_MODES = 6, 12  #: smallest and largest number of modes that keep their damping ratios
 PAIR = 1.01  #: frequency ratio below which modes form a pair, such as the bending modes of a square section
 FIXED_MODES = 30  #: number of fixed-cut modes of each part
-MOST = 2.0  #: largest strain damping of a part, over the largest that a mode needs
-LEAST = 0.5  #: strain damping outside the patterns, over the smallest that a mode needs
+MOST = 2.0  #: largest strain damping of a part, divided by the largest that a mode needs
+LEAST = 0.5  #: strain damping outside the patterns, divided by the smallest that a mode needs
 EXACT = 1e-4  #: largest relative error of a modal damping
 ROUNDS = 6  #: largest number of corrections by the ratios of the joined body
 STEPS = 3000  #: largest number of gradient steps
 PATIENCE = 300  #: number of gradient steps in which the error must fall by a tenth
-SMALL = 0.01  #: damping of a mode over the largest one, below which errors are relative to this threshold
+SMALL = 0.01  #: damping of a mode divided by the largest one; below it, errors are relative to this threshold
 N_RIGID = 6  #: number of interface dofs that can support a frame
-SAME_MOTION = 1e-8  #: momentum of a rigid-body motion over that of others, below which it is dependent
-SAME_STRAIN = 1e-10  #: energy share of a strain pattern in a part over the largest one, below which it is dropped
-NO_MASS = 1e-12  #: 1/omega² of a mode over the largest one, below which the mode has no mass
+SAME_MOTION = 1e-8  #: momentum of a rigid-body motion divided by that of others, below which it is dependent
+SAME_STRAIN = 1e-10  #: energy share of a strain pattern in a part divided by the largest; below it, it is dropped
+NO_MASS = 1e-12  #: 1/omega² of a mode divided by the largest one, below which the mode has no mass
 
 
 @dataclass(frozen=True)
@@ -107,11 +108,12 @@ def damping_of_parts(
     Parameters
     ----------
     bodies
-        The coupled parts; cut k is an interface of parts k and k + 1.
+        Coupled parts; cut k is an interface of parts k and k + 1.
     ratios
-        Damping ratios of the modes, from their ω² [1/time²].
+        Function that returns the damping ratios of modes from their ω² [1/time²].
     held
-        Interface to which the frame of the whole body is attached; None, or one of more than six dofs: free modes.
+        Interface to which the frame of the whole body is attached. If it is None or has more than six dofs, free modes
+        are used.
     solver
         Name of the solver.
     """
@@ -167,8 +169,8 @@ def worst(found: Array, wanted: Array, n: int) -> float:
 def joined_parts(bodies: Sequence[FEBody], held: str | None, solver: str | None) -> JoinedParts:
     """Condense each part to its cuts, fixed interface and fixed-cut modes, and join the parts at the cuts.
 
-    The coordinates of the joined body are a basis of the motions that have the same motion of the reference points at
-    each cut, and none at the held interface.
+    The coordinates of the joined body are a basis of the motions in which the reference points at each cut move
+    together and the fixed interface does not move.
     """
     center = np.mean([body.nodes.mean(axis=0) for body in bodies], axis=0)
     columns, stiffness, masses, rigid, omega2 = [], [], [], [], []
@@ -266,8 +268,9 @@ def fitted(
 ) -> tuple[list[Array], float]:
     """Return matrices near Y with eigenvalues within bounds and (Σ_p R_pᵀ Y_p R_p)_kk = c_k for k < n_exact.
 
-    Also return the largest relative error of these modes; it is relative to a share `SMALL` of the largest c where c_k
-    is smaller. The gradient step is 1/L, L the largest eigenvalue of the map from errors to gradients to errors.
+    Also return the largest relative error of these modes. If c_k is smaller than `SMALL` times the largest c, its error
+    is relative to that value. The gradient step is 1/L, where L is the largest eigenvalue of the map from errors to
+    gradients and back to errors.
     """
     scale = np.maximum(c, SMALL * c.max())[:n_exact]
     columns = [r[:, :n_exact] / np.sqrt(scale) for r in R]

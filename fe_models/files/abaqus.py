@@ -1,9 +1,9 @@
 """The mesh of an Abaqus or CalculiX deck: nodes, elements and sets.
 
-Read here and not by meshio, which replaces repeated *NODE, *NSET and *ELSET blocks instead of appending, ends a block
-at a comment line, ignores sets of sets, the coordinate system of *NODE and instance transformations, and mixes up the
-sets of *ELEMENT blocks. Loads, sections and materials are not read. Keywords that make or move nodes or elements, and
-that are not understood here, are refused.
+meshio is not used: it replaces repeated *NODE, *NSET and *ELSET blocks instead of appending them, ends a block at a
+comment line, ignores sets of sets, the coordinate system of *NODE and instance transformations, and confuses the sets
+of *ELEMENT blocks. Loads, sections and materials are not read. Keywords that create or move nodes or elements and that
+are not supported raise an error.
 """
 
 import re
@@ -141,8 +141,8 @@ def read_abaqus(path: Path, data: bytes) -> RawMesh:
     """Return the nodes, elements and sets of a deck.
 
     Sets keep the spelling of their first appearance; names are compared without regard to case, as Abaqus does.
-    Repeated sets are joined. A deck of one part with one instance that is not moved reads like a flat deck. Included
-    files are put in; nodes that a set names and that are not there are left out of it, as CalculiX does.
+    Repeated sets are joined. A deck of one part with one instance that is not moved is read like a flat deck. Included
+    files are inserted. Nodes of a set that do not exist are left out of it, as CalculiX does.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def read_abaqus(path: Path, data: bytes) -> RawMesh:
     Raises
     ------
     MeshError
-        If the deck makes or moves nodes or elements in a way that is not understood here, or is damaged.
+        If the deck creates or moves nodes or elements in a way that is not supported, or is damaged.
     """
     where = f"mesh {path}"
     included: dict[str, str] = {}
@@ -180,7 +180,7 @@ def deck_mesh(where: str, blocks: list[DeckBlock]) -> DeckMesh:
     Raises
     ------
     MeshError
-        If there are no nodes, numbers repeat, or a set names what is not there.
+        If there are no nodes, numbers repeat, or a set refers to an unknown set.
     """
     node_sets, element_sets = _Sets(where, "NSET"), _Sets(where, "ELSET")
     content = _Content()

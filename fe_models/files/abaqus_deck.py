@@ -51,13 +51,13 @@ def deck_blocks(where: str, text: str, folder: Path, included: dict[str, str] | 
     Parameters
     ----------
     where
-        For messages.
+        Name of the deck, for messages.
     text
-        Of the deck.
+        Text of the deck.
     folder
-        Against which names of included files are taken.
+        Folder to which the names of included files are relative.
     included
-        Is filled: path of each included file -> its sha256.
+        Dictionary that receives the sha256 of each included file, by path.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def mesh_blocks(
     Raises
     ------
     MeshError
-        If the text is no deck, has several parts, moves its instance, or makes nodes or elements by keywords.
+        If the text is no deck, has several parts, moves its instance, or generates nodes or elements by keywords.
     """
     blocks = deck_blocks(where, text, folder, included)
     refuse_unread(where, blocks)

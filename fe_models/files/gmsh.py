@@ -1,9 +1,9 @@
 """Gmsh meshes, formats 2.2 and 4.1, text and binary.
 
-Read here and not by meshio, which lists a cell of two groups twice (2.2), drops all but one of several physical
-groups (4.1 without names), merges groups of one name and different dimension, fails where only some entities have a
-physical group, and does not know node numbers with gaps (2.2 binary). Format: Gmsh reference manual, "MSH file
-format" and "Legacy formats: MSH file format version 2".
+meshio is not used: it lists a cell of two groups twice (2.2), drops all but one of several physical groups (4.1 without
+names), merges groups with the same name and different dimensions, fails if only some entities have a physical group,
+and does not support node numbers with gaps (2.2 binary). Format: Gmsh reference manual, "MSH file format" and "Legacy
+formats: MSH file format version 2".
 """
 
 import shlex
@@ -122,8 +122,8 @@ class _Names(dict[tuple[int, int], str]):
 def read_gmsh(path: Path, data: bytes) -> RawMesh:
     """Return the nodes, cells and physical groups of a Gmsh file.
 
-    A physical group gets its name, or `group_<tag>` where it has none. Groups of surfaces are face groups, groups of
-    curves and points are node sets.
+    A physical group without a name is named `group_<tag>`. Groups of surfaces are face groups; groups of curves and
+    points are node sets.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """MED meshes (Salome, Code_Aster), with their groups.
 
-Read here by h5py: meshio keeps the orientation of MED, in which every solid cell is inside out for it, and fails
-where only some cell types have families. Layout: a MED file is HDF5; /ENS_MAA/<mesh>/<step>/NOE holds the nodes, MAI
-the cells by type, FAM the family of each, and /FAS/<mesh> the names of the groups each family belongs to.
+Files are read with h5py. meshio does not convert the node order of MED, in which every solid cell is inverted for it,
+and fails if only some cell types have families. A MED file is an HDF5 file: /ENS_MAA/<mesh>/<step>/NOE contains the
+nodes, MAI the cells by type, FAM the family of each, and /FAS/<mesh> the names of the groups of each family.
 """
 
 import io
@@ -41,8 +41,8 @@ _TYPES = {
 def read_med(path: Path, data: bytes) -> RawMesh:
     """Return the nodes, cells and groups of a MED file with one mesh at one step.
 
-    Solid cells are turned to the orientation of meshio (VTK). Files in which they already have it, as meshio writes
-    them, are recognised by the sign of the Jacobian.
+    Solid cells are converted to the orientation of meshio (VTK). Files in which they already have it, such as those
+    from meshio, are recognised by the sign of the Jacobian.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """The mesh of a Nastran bulk data deck: grid points, elements, and property numbers as groups.
 
-Read here and not by meshio, which ignores coordinate systems (CP) and INCLUDE, skips elements in large field format
-and cards in lower case, and assigns property numbers to the wrong elements where some have none. The cards are those
-of whole decks, `fe_models.files.bulk_data`.
+meshio is not used: it ignores coordinate systems (CP) and INCLUDE, skips elements in large field format and cards in
+lower case, and assigns property numbers to the wrong elements if some have none. Cards are read as for whole decks
+(`fe_models.files.bulk_data`).
 """
 
 import re
@@ -46,23 +46,22 @@ BEGIN, END = re.compile(r"(?im)^[ \t]*BEGIN"), re.compile(r"(?im)^[ \t]*ENDDATA"
 
 
 def read_nastran(path: Path, data: bytes) -> RawMesh:
-    """Return grid points and elements; the elements of property n are group `pid_n`, those without one in none.
+    """Return grid points and elements; elements with property n form the group `pid_n`.
 
-    Cards, includes and coordinate systems are those of whole decks (`fe_models.files.bulk_data`). A deck may start
+    Cards, includes and coordinate systems are read as for whole decks (`fe_models.files.bulk_data`). A deck may start
     with its bulk data. Displacement coordinate systems (CD) do not move nodes and are not read.
 
     Parameters
     ----------
     path
-        File name, for messages and for files that are included.
+        File name, for messages and as base of the paths of included files.
     data
         Content of the file.
 
     Raises
     ------
     MeshError
-        If a coordinate system or an included file is missing, cards are replicated or not in sequence, or the deck is
-        damaged.
+        If a coordinate system or an included file is missing, cards are not in sequence, or the deck is damaged.
     """
     where = f"mesh {path}"
     included: dict[str, str] = {}
@@ -71,7 +70,7 @@ def read_nastran(path: Path, data: bytes) -> RawMesh:
         why = "a deck of several superelements; expected one body"
         raise MeshError(f"{where}: BEGIN SUPER = {max(parts)}: {why}; read it as a whole deck ([body] deck)")
     text = parts[0]
-    placing: list[Card] = []  # what says where grid points are
+    placing: list[Card] = []  # cards that define positions of grid points
     cells: dict[tuple[str, int, str], tuple[list[int], list[list[str]]]] = {}  # card, nodes, property -> elements
     noted: dict[str, int] = {}
     for card in read_cards(where, text):

@@ -29,13 +29,13 @@ __all__ = ["MESH_FORMATS", "geometry_from_raw", "read_geometry", "read_line_mesh
 
 
 # geometry -------------------------------------------------------------------------------------------------------------
-# The geometry beside matrices: nodes with numbers and groups, with their solid cells where all of them are known.
+# Geometry that accompanies matrices: nodes with numbers and groups, and solid cells if all cells are known.
 
 
 def geometry_from_raw(raw: RawMesh, path: Path, digest: str) -> Mesh | NodeCloud:
-    """Return the mesh of a file of solids; of shells, beams, mixed or unknown elements their nodes and groups.
+    """Return the mesh of a file if all elements are known solids, otherwise only its nodes and groups.
 
-    Geometry selects surface nodes of solids, and any nodes of the others.
+    Geometric selections find surface nodes in a mesh of solids, and all nodes otherwise.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def geometry_from_raw(raw: RawMesh, path: Path, digest: str) -> Mesh | NodeCloud
     Raises
     ------
     MeshError
-        If there are no nodes, or what is known of the mesh is impossible.
+        If there are no nodes, or the known part of the mesh is invalid.
     """
     kinds = {block.kind for block in raw.blocks if len(block.nodes)}
     lone = kinds - {"vertex"}
@@ -102,8 +102,8 @@ def read_mesh(path: str | Path) -> Mesh:
     """Read the mesh of one body from a file.
 
     The suffix names the format: Gmsh 2.2 and 4.1 (.msh), VTK (.vtk, .vtu), Abaqus and CalculiX (.inp), Nastran
-    (.bdf, .nas, .dat, .fem, .blk, .bulk), MED (.med). Cells of two dimensions become faces, those of one or none become
-    node sets; they select interfaces and are no part of the body. `Mesh.notes` says what was left out.
+    (.bdf, .nas, .dat, .fem, .blk, .bulk), MED (.med). Cells of two dimensions become faces; cells of one dimension and
+    points become node sets. They select interfaces and are no part of the body. `Mesh.notes` lists what was left out.
 
     Parameters
     ----------
@@ -113,13 +113,13 @@ def read_mesh(path: str | Path) -> Mesh:
     Returns
     -------
     Mesh
-        With the sha256 of the file as `digest`.
+        Mesh with the sha256 of the file as `digest`.
 
     Raises
     ------
     MeshError
         If the file is missing, unreadable, damaged, of an unknown or unsupported kind, or could only be read with
-        another meaning than its own program gives it.
+        another meaning than in its own program.
     """
     return _read(path, mesh_from_raw)
 
@@ -135,12 +135,12 @@ def read_geometry(path: str | Path) -> Mesh | NodeCloud:
     Returns
     -------
     Mesh or NodeCloud
-        A mesh where all elements are solids that are known here, else the nodes and what selects them.
+        Mesh if all elements are known solids, otherwise the nodes and their groups.
 
     Raises
     ------
     MeshError
-        As `read_mesh`, but for elements: they may be of any kind.
+        As for `read_mesh`, but elements may be of any kind.
     """
     from fe_models.files.decks.read_deck import DECK_FORMATS, read_deck
 
@@ -154,9 +154,9 @@ def read_geometry(path: str | Path) -> Mesh | NodeCloud:
 def read_line_mesh(path: str | Path, *, groups: Iterable[str] | None = None) -> LineMesh:
     """Read the lines of a frame from a mesh file, with the readers of `read_mesh`.
 
-    Cells with two nodes, and those with three as two lines, are beams: Gmsh curves, VTK lines, Abaqus B31 and B32,
-    Nastran CBAR and CBEAM, MED SE2. Their groups name sections (Gmsh physical curves, Abaqus element sets, Nastran
-    pid_7), groups of points name interfaces. Solids, faces and nodes on no line are left out; `notes` says so.
+    Cells with two nodes are beams, and cells with three nodes are two beams each: Gmsh curves, VTK lines, Abaqus B31
+    and B32, Nastran CBAR and CBEAM, MED SE2. Their groups select sections (Gmsh physical curves, Abaqus element sets,
+    Nastran pid_7); groups of points select interfaces. Solids, faces and nodes on no line are left out, with a note.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def read_line_mesh(path: str | Path, *, groups: Iterable[str] | None = None) -> 
     Raises
     ------
     MeshError
-        As `read_mesh`, and if there are no lines or a group is unknown.
+        As for `read_mesh`, and if there are no lines or a group is unknown.
     """
     wanted = None if groups is None else tuple(groups)
     return _read(path, lambda raw, path, digest: line_mesh_from_raw(raw, path, digest, wanted))
@@ -179,10 +179,10 @@ def read_shell_mesh(
 ) -> ShellMesh:
     """Read the triangles and quads of a shell from a mesh file, by the same readers as `read_mesh`.
 
-    Cells of three and four nodes are shells, those of six and nine four shells each: Gmsh surfaces, VTK, Abaqus S3 and
-    S4, Nastran CTRIA3 and CQUAD4, MED TR3 and QU4. Their groups name thicknesses (Gmsh physical surfaces, Abaqus
-    element sets, Nastran pid_7); groups of points and lines name interfaces. Solids and nodes of neither shells nor
-    stiffeners are left out; `notes` says so.
+    Cells with three or four nodes are shells, and cells with six or nine nodes are four shells each: Gmsh surfaces,
+    VTK, Abaqus S3 and S4, Nastran CTRIA3 and CQUAD4, MED TR3 and QU4. Their groups select thicknesses (Gmsh physical
+    surfaces, Abaqus element sets, Nastran pid_7); groups of points and lines select interfaces. Solids, and nodes of
+    neither shells nor stiffeners, are left out, with a note.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def read_shell_mesh(
     Raises
     ------
     MeshError
-        As `read_mesh`, and if there are no triangles or quads or a group is unknown.
+        As for `read_mesh`, and if there are no triangles or quads or a group is unknown.
     """
     wanted, lines = None if groups is None else tuple(groups), tuple(stiffeners)
     return _read(path, lambda raw, path, digest: shell_mesh_from_raw(raw, path, digest, wanted, lines))

@@ -1,4 +1,4 @@
-"""Bodies from a vector basis of scikit-fem, and stiffness and mass matrices that its user assembled."""
+"""Bodies from a vector basis of scikit-fem and the stiffness and mass matrices that its user assembled."""
 
 from collections.abc import Iterable
 from importlib.metadata import version
@@ -31,12 +31,12 @@ def body_from_skfem(
     held: bool = False,
     accept: Iterable[str] = (),
 ) -> FEBody:
-    """Return a body of matrices that the user assembled over a vector basis of scikit-fem, from any forms.
+    """Return a body from matrices that the user assembled from any forms over a vector basis of scikit-fem.
 
     The basis may use any element whose dofs are the values of a component at a point (`ElementVector` of P1, P2, Q1,
     Q2, serendipity, wedges, Crouzeix-Raviart, higher orders). The shape functions are checked for this property. If M
-    is M_s ⊗ 1₃, as a density makes it, all inertia invariants are exact. The matrices give no stress and no geometric
-    stiffness. `solid_body(basis, material)` gives both, also for orthotropic materials.
+    is M_s ⊗ 1₃, as for a mass density, all inertia invariants are exact. The body has no stress and no geometric
+    stiffness; `solid_body(basis, material)` gives both, also for orthotropic materials.
 
     Parameters
     ----------

@@ -35,7 +35,8 @@ def read_tables(nodes: str | Path, lines: str | Path) -> LineMesh:
     Raises
     ------
     MeshError
-        With file, line and column, if a table is missing something, a number is none, a node is unknown or repeated.
+        If a table is incomplete, a number is invalid, or a node is unknown or repeated; the message names file, line
+        and column.
     """
     node_path, line_path = Path(nodes), Path(lines)
     node_rows, node_digest = _table(node_path, NODE_COLUMNS, ("node", "x", "y"))

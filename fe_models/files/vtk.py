@@ -18,20 +18,20 @@ _WITHOUT_SIZE = ("wedge12", "wedge15", "wedge18", "pyramid13", "hexahedron24", "
 def read_vtk(path: Path, data: bytes) -> RawMesh:
     """Return the nodes and cells, with a group `<array>_<value>` for every value of whole-number cell data.
 
-    Whole-number point data that hold only 0 and 1 become node sets. Linear wedges are taken inside out where the
-    program that wrote them did not follow VTK's own definition of their orientation.
+    Whole-number point data that contain only 0 and 1 become node sets. Linear wedges that do
+    not have the orientation that VTK defines are reversed.
 
     Parameters
     ----------
     path
-        File, read by meshio.
+        Path of the file, read by meshio.
     data
-        Its content, for what meshio would pass over.
+        Content of the file, which is checked for data that meshio would ignore.
 
     Raises
     ------
     MeshError
-        If meshio cannot read the file, would drop cells of it, or it has several pieces (meshio keeps the last).
+        If meshio cannot read the file or would drop cells, or if the file has several pieces (meshio keeps the last).
     """
     import meshio
 

@@ -22,7 +22,7 @@ from fe_models.foundation.documents.document import (
 
 __all__ = ["correlation_document"]
 
-GOOD_MAC, POOR_MAC = 0.9, 0.7  #: customary limits of the MAC: above the first good, below the second poor
+GOOD_MAC, POOR_MAC = 0.9, 0.7  #: customary limits of the MAC: good above the first, poor below the second
 GOOD_ERROR, POOR_ERROR = 0.02, 0.05
 GOOD_CROSS = 0.1  #: customary limit of the mass-weighted product of two measured shapes
 MOST_POINTS = 20

@@ -1,13 +1,14 @@
 """Discretisation error of the free frequencies of a CAD body, from the same job with two mesh sizes.
 
-(1) the job is meshed at its own size h and at a coarser one, curvature and least size in proportion;
-(2) both bodies are coupled as the job says, and their lowest elastic frequencies found;
-(3) with f(h) = f + c h^p the error at h is (f(r h) - f(h)) / (r^p - 1), Richardson's extrapolation. The ratio r is that
-    of the numbers of dofs, to the power 1/3. The order is taken as p = 1: frequencies of elements of order k converge
-    with h^(2k) where the modes are smooth, but with h^(2 lambda) beside a re-entrant edge, where the displacement goes
-    with r^lambda: lambda is 1/2 at a crack, 0.545 at a right angle, and such edges rule in the end. Smooth modes are
-    then overestimated, by a factor of (r⁴ - 1) / (r - 1)
-(4) cells of first order may be far from converging: no error is less than what the mesh report finds for them
+(1) the job is meshed at its own size h and at a coarser one; curvature and smallest size change in proportion
+(2) both bodies are coupled as the job requires, and their lowest elastic frequencies are computed
+(3) with f(h) = f + c h^p, the error at h is (f(r h) - f(h)) / (r^p - 1) (Richardson extrapolation). The ratio r is the
+    ratio of the numbers of dofs to the power 1/3. The assumed order is p = 1. Frequencies of elements of order k
+    converge with h^(2k) where the modes are smooth. Beside a re-entrant edge the displacement varies with the distance
+    to the power lambda, and frequencies converge with h^(2 lambda): lambda is 1/2 at a crack and 0.545 at a right
+    angle. Such edges dominate for fine meshes. With p = 1, the errors of smooth modes of quadratic elements are
+    overestimated by a factor of (r⁴ - 1) / (r - 1)
+(4) first-order cells can be far from convergence: no error is smaller than the one in the mesh report
 """
 
 from dataclasses import dataclass, replace
@@ -64,20 +65,20 @@ def mesh_convergence(
     Parameters
     ----------
     job
-        A job file whose mesh is a CAD file, or a job that was read.
+        Job whose mesh is a CAD file, or the path of its job file.
     ratio
-        The coarse size over that of the job, above 1.
+        Coarse mesh size divided by that of the job, above 1.
     n_modes
-        How many elastic frequencies.
+        Number of elastic frequencies.
     stages
-        Takes the time of each stage.
+        Receives the time of each stage.
 
     Raises
     ------
     JobError
-        If the body is not meshed here, the ratio is none, or both sizes give the same mesh.
+        If the body does not come from a CAD file, the ratio is invalid, or both sizes give the same mesh.
     MeshError, InterfaceError
-        As a job.
+        If the mesh or an interface of the job is invalid.
     """
     job = job if isinstance(job, Job) else read_job(Path(job))
     stages = stages or Stages()

@@ -34,15 +34,15 @@ class AnsysMatrices:
 def read_full(path: str | Path) -> AnsysMatrices:
     """Read a .full file.
 
-    (1) header: sizes and pointers; nodes, labels of dofs, dofs of each node, and which of them are held
+    (1) header: sizes and pointers; nodes, labels of dofs, dofs of each node, and which of them are constrained
     (2) each matrix: for every row a record of columns, from 1, and one of values; upper triangle
-    (3) rows that are held have a one on the diagonal of K: they are taken out
+    (3) constrained rows have only a one on the diagonal of K: they are removed
 
     Raises
     ------
     MatrixError
-        If the file is truncated or damaged, unsymmetric, scaled, or with constraint equations, which it keeps apart
-        from the matrices; if it has dofs other than displacements and rotations, or no stiffness.
+        If the file is truncated, damaged, unsymmetric or scaled, or has constraint equations, which are not part of
+        its matrices; also if it has dofs other than displacements and rotations, or no stiffness.
     """
     path = Path(path)
     file = AnsysFile(f"FULL file {path}", path, (FULL,))

@@ -24,7 +24,7 @@ class AnsysFile:
     Raises
     ------
     MatrixError
-        If the file cannot be read, is in the other byte order, or no binary file of ANSYS.
+        If the file cannot be read, has the other byte order, or is no binary file of ANSYS.
     """
 
     def __init__(self, where: str, path: Path, kind: tuple[int, ...]) -> None:

@@ -44,16 +44,16 @@ def read_sub(path: str | Path) -> AnsysSuperelement:
     """Read a superelement of ANSYS.
 
     (1) header at word 103: sizes, and word pointers of the records
-    (2) rows: dof numbers (node - 1) n_labels + label; the last rows are modal coordinates, whose dofs belong to nodes
-        of their own, numbered far above those of the mesh in the list of nodes
-    (3) matrices row by row: stiffness, mass, damping, in full; load vectors
-    (4) the mass that the file says is that of its matrix
+    (2) rows: dof numbers (node - 1) n_labels + label; the last rows are modal coordinates, whose dofs belong to
+        additional nodes with far higher numbers than the nodes of the mesh
+    (3) full matrices row by row: stiffness, mass, damping; load vectors
+    (4) check that the mass stated in the file is the mass of its matrix
 
     Raises
     ------
     MatrixError
-        If the file is truncated or damaged, unsymmetric, with a stress stiffness or rotated copies, its rows do not
-        belong to its nodes, or its mass is not that of its matrix.
+        If the file is truncated, damaged or unsymmetric, or has a stress stiffness or rotated copies; also if its rows
+        do not belong to its nodes, or the mass that it states is not the mass of its matrix.
     """
     path = Path(path)
     file = AnsysFile(f"SUB file {path}", path, (SUB,))  # (1)

@@ -33,7 +33,7 @@ class Card:
         Raises
         ------
         MeshError
-            If it is none, or blank without a default.
+            If it is no number of this kind, or is blank without a default.
         """
         word = self.text(k)
         if not word and default is not None:
@@ -49,7 +49,7 @@ class Card:
         Raises
         ------
         MeshError
-            If it is none, or blank without a default.
+            If it is no number of this kind, or is blank without a default.
         """
         word = self.text(k)
         if not word and default is not None:
@@ -75,8 +75,8 @@ def read_cards(where: str, text: str) -> Iterator[Card]:
     Raises
     ------
     MeshError
-        If a continuation has no card before it, or does not carry the mark that its card asks for, a line has too many
-        fields, or a replicated card has none before it.
+        If a continuation has no card before it or has another mark than its card requires, a line has too many fields,
+        or there is no card before a replication.
     """
     lines = text.splitlines()
     begin = next((k for k, line in enumerate(lines) if line.lstrip()[:5].upper() == "BEGIN"), -1)

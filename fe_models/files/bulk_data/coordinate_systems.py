@@ -73,14 +73,14 @@ class GridPoints:
 def read_grid_points(cards: Iterable[Card], *, only_positions: bool = False) -> GridPoints:
     """Return the grid points of GRID and GRDSET cards in the systems of CORD cards.
 
-    A card that is there twice with the same fields counts once. With `only_positions` displacement axes (CD) and
-    systems that place no grid point are not looked at.
+    Repeated cards with the same fields count once. With `only_positions`, displacement axes (CD) and systems that no
+    position depends on are ignored.
 
     Raises
     ------
     MeshError
-        If two cards of one number differ, a system or a grid point is missing or defined by itself, or the points of
-        a system lie on one line.
+        If two cards with the same number differ, a system or a grid point is missing or its definition depends on
+        itself, or the points of a system lie on one line.
     """
     resolver = _Resolver(tuple(cards))
     if not only_positions:

@@ -19,11 +19,11 @@ def bulk_text(where: str, path: Path, text: str, included: dict[str, str], files
     Parameters
     ----------
     where, path, text
-        For messages; of the deck.
+        Name (for messages), path and text of the deck.
     included
-        Is filled: path of each included file -> its sha256.
+        Dictionary that receives the sha256 of each included file, by path.
     files
-        The files that this one is included in.
+        Files that include this one.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def bulk_text(where: str, path: Path, text: str, included: dict[str, str], files
         elif head.startswith("ENDDATA") and not is_first:
             break
         elif head.split()[:1] == ["BEGIN"]:
-            if is_first or _section(where, line):  # BEGIN BULK of an included file says nothing
+            if is_first or _section(where, line):  # BEGIN BULK of an included file has no meaning
                 out.append(line)
         else:
             out.append(line)

@@ -16,7 +16,7 @@ NAMED = {"Plane": "plane", "Cylinder": "cylinder", "Cone": "cone", "Sphere": "sp
 SAMPLES = np.linspace(0.08, 0.92, 7)  #: fractions of the ranges of both surface parameters at which a face is sampled
 EQUAL = 1e-5  #: relative difference up to which curvatures or directions are equal
 KERNEL_TOLERANCE = 1e-7  #: margin that the CAD kernel adds to its bounding boxes
-INSIDE = 1e-5  #: distance from a face over the diagonal at which points are tested for being inside the material
+INSIDE = 1e-5  #: distance from a face, divided by the diagonal, of the points that are tested for being in the material
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,9 +86,9 @@ def cad_faces(gmsh: ModuleType, scale: float) -> tuple[CadFace, ...]:
     Parameters
     ----------
     gmsh
-        With the geometry in its model, synchronised.
+        The module gmsh, with the synchronised geometry in its model.
     scale
-        The length unit of the job over that of the model.
+        Length unit of the job, in units of the model.
     """
     box = np.array(gmsh.model.getBoundingBox(-1, -1))
     diagonal = float(np.linalg.norm(box[3:] - box[:3]))
@@ -155,7 +155,7 @@ def _box(gmsh: ModuleType, tag: int, points: Array) -> Array:
 def _sampled(gmsh: ModuleType, tag: int) -> tuple[Array, Array, Array, Array]:
     """Return points, normals, (n, 3), principal curvatures by ascending size, (n, 2), and their directions, (n, 2, 3).
 
-    All at points inside the borders of the face.
+    The points are inside the borders of the face.
     """
     lo, hi = (np.array(bound) for bound in gmsh.model.getParametrizationBounds(2, tag))
     grid = np.stack(np.meshgrid(SAMPLES, SAMPLES, indexing="ij"), axis=-1).reshape(-1, 2)

@@ -22,7 +22,7 @@ from fe_models.meshes.mesh import Mesh
 
 __all__ = ["MeshSize", "mesh_cad"]
 
-SMALLEST = 0.05  #: default for the smallest over the largest element size, at sharp curvature and small features
+SMALLEST = 0.05  #: default of the smallest element size (sharp curvature, small features) divided by the largest
 MOST_ELEMENTS = 5e6  #: estimated number of elements above which the size is probably in a wrong unit
 
 
@@ -36,7 +36,7 @@ class MeshSize:
     size
         Largest edge of an element [length].
     smallest
-        Smallest edge of an element at curved surfaces and small features [length]; None: 0.05 of `size`.
+        Smallest edge of an element at curved surfaces and small features [length]; None: 0.05 times `size`.
     curvature
         Number of elements around a full circle; 0: the size does not follow curvature.
     order
@@ -47,7 +47,7 @@ class MeshSize:
     Raises
     ------
     MeshError
-        Unless sizes are above zero and in order, the order is 1 or 2, and the curvature is none or 3 and more.
+        Unless sizes are above zero and in order, the order is 1 or 2, and the curvature is 0 or from 3 to 1000.
     """
 
     size: float
@@ -83,24 +83,25 @@ def mesh_cad(path: str | Path, size: MeshSize, *, units: Units | str, faces: Ite
     Parameters
     ----------
     path
-        STEP, IGES or BREP, as for `fe_models.files.cad.cad_model.read_cad`.
+        STEP, IGES or BREP file, as in `fe_models.files.cad.cad_model.read_cad`.
     size
-        How fine, in the length unit of `units`.
+        Element sizes, in the length unit of `units`.
     units
-        The unit system of the mesh.
+        Unit system of the mesh.
     faces
-        Selectors (`fe_models.files.cad.face_selectors`); each is a group of faces of that name.
+        Selectors (`fe_models.files.cad.face_selectors`); each makes a group of faces with its text as name.
 
     Returns
     -------
     Mesh
-        With the groups of cells "solid 1", ... and the names of solids in the file, and the groups of faces "face 1",
-        ..., names of faces in the file and `faces`. `Mesh.origin` says what became of the geometry.
+        Mesh with the groups of cells "solid 1", ... and one for each name of a solid in the file. Its groups of faces
+        are "face 1", ..., one for each name of a face in the file, and `faces`. `Mesh.origin` records the geometry and
+        how it was meshed.
 
     Raises
     ------
     MeshError
-        As `read_cad`, and if the size is beyond reason, or gmsh cannot mesh the body with it.
+        If `read_cad` raises it, the size is unreasonable, or gmsh cannot mesh the body with it.
     InterfaceError
         If a selector chooses nothing.
     MeshingError

@@ -23,7 +23,7 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["CadModel", "CadPart", "open_cad", "read_cad"]
 
-OVERLAP = 1e-6  #: shared volume of two solids over their volume, up to which it is rounding
+OVERLAP = 1e-6  #: shared volume of solids divided by their volume, up to which it is rounding
 OPTIONS: dict[str, float | str] = {
     "Geometry.OCCImportLabels": 1,
     "Geometry.OCCScaling": 1.0,
@@ -41,12 +41,12 @@ KERNEL_UNITS = {1e-3: "MM", 1e-2: "CM", 1.0: "M", 1e3: "KM", 0.0254: "INCH", 0.3
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class CadPart:
-    """What a CAD file holds, in the length unit of the job.
+    """Content of a CAD file, in the length unit of the job.
 
     Parameters
     ----------
     path
-        The CAD file.
+        Path of the CAD file.
     digest
         sha256 of the file.
     format
@@ -56,9 +56,9 @@ class CadPart:
     units
         Unit system of the job.
     solids
-        Names of the solids, or "" where they have none.
+        Names of the solids; "" for a solid without name.
     faces
-        The faces of the geometry, by ascending number.
+        Faces of the geometry, by ascending number.
     volume
         Volume of all solids [length³].
     lo
@@ -89,11 +89,11 @@ class CadPart:
 
 @dataclass(frozen=True, eq=False)
 class CadModel:
-    """An open model of gmsh beside what was found in it."""
+    """An open model of gmsh and its content."""
 
     gmsh: ModuleType
     part: CadPart
-    scale: float  #: length unit of the job over that of the model
+    scale: float  #: length unit of the job, in units of the model
 
 
 def read_cad(path: str | Path, *, units: Units | str) -> CadPart:
@@ -102,15 +102,15 @@ def read_cad(path: str | Path, *, units: Units | str) -> CadPart:
     Parameters
     ----------
     path
-        STEP (.step, .stp), IGES (.iges, .igs) or BREP (.brep).
+        STEP file (.step, .stp), IGES file (.iges, .igs) or BREP file (.brep).
     units
-        In whose length unit the numbers are wanted. STEP and IGES name their own and are converted; BREP has none, and
-        its numbers are taken as they are.
+        Unit system of the returned numbers. STEP and IGES files state their length unit and are converted. BREP files
+        have none; their numbers are not changed.
 
     Raises
     ------
     MeshError
-        If the file is missing, damaged, of another kind, names no length unit, or holds no solid, or solids overlap.
+        If the file is missing, damaged, of another kind, states no length unit or has no solid, or solids overlap.
     MeshingError
         If gmsh is not installed.
     """
@@ -122,11 +122,12 @@ def read_cad(path: str | Path, *, units: Units | str) -> CadPart:
 def open_cad(path: str | Path, *, units: Units | str) -> Iterator[CadModel]:
     """Open a CAD file in gmsh, as `read_cad` does, until the context ends.
 
-    (1) the file's unit is read from its text; gmsh converts STEP to millimetres whatever it is, and leaves IGES in its
-        own, since the kernel sews faces whose edges are 1e-6 apart at most, which is less than the digits of metres;
-    (2) faces without solids are sewn to one if they close; several solids are cut where they touch, so that they share
-        faces and their meshes fit;
-    (3) every number is divided by `scale`, the length unit of the job in units of the model.
+    (1) the unit of the file is read from its text. gmsh converts every STEP file to millimetres. It leaves IGES files
+        in their unit: the kernel only sews faces whose edges are at most 1e-6 apart, and in metres the coordinates are
+        not written to that accuracy
+    (2) faces without solids are sewn to one solid if they enclose a volume; several solids are cut where they touch, so
+        that they share faces and their meshes are compatible
+    (3) every number is divided by `scale`, the length unit of the job in units of the model
     """
     path = Path(path)
     units = unit_system(units) if isinstance(units, str) else units

@@ -13,7 +13,7 @@ from fe_models.foundation.units import Units
 __all__ = ["CadSurface", "surface_of_cad"]
 
 AROUND = 36  #: number of triangles around a full circle
-FINENESS = 0.05  #: largest edge length over the diagonal of the body
+FINENESS = 0.05  #: largest edge length divided by the diagonal of the body
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ def surface_of_cad(path: str | Path, *, units: Units | str) -> CadSurface:
     Raises
     ------
     MeshError
-        As `read_cad`, and if gmsh cannot mesh a face.
+        If `read_cad` raises it, or gmsh cannot mesh a face.
     """
     with open_cad(path, units=units) as model:
         gmsh, part = model.gmsh, model.part

@@ -1,8 +1,8 @@
 """Length unit in the text of a CAD file; gmsh converts the unit without reporting it.
 
-STEP: the entities of LENGTH_UNIT that the contexts of shapes name, with SI_UNIT(prefix, .METRE.), or with
-CONVERSION_BASED_UNIT(name, factor), whose factor is a measure in another unit. IGES: fields 14 and 15 of the global
-section. BREP: none.
+A STEP file states it in the LENGTH_UNIT entities to which the contexts of its shapes refer, either with SI_UNIT(prefix,
+.METRE.), or with CONVERSION_BASED_UNIT(name, factor), whose factor is a measure in another unit. An IGES file states it
+in fields 14 and 15 of the global section. A BREP file has no unit.
 """
 
 import re
@@ -37,7 +37,7 @@ def length_unit(path: Path, content: bytes) -> tuple[str, float] | None:
     Raises
     ------
     MeshError
-        If a STEP or IGES file names no length unit, one that is not known, or several.
+        If a STEP or IGES file states no length unit, an unknown one, or several.
     """
     kind = CAD_SUFFIXES[path.suffix.lower()]
     if kind == "BREP":

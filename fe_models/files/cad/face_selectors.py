@@ -1,21 +1,21 @@
-"""Faces chosen by what they are: "cylinder r=12 hole", "plane x=100", "x=0..20 z=0..5", "colour=#ff0000", "face 7".
+"""Faces selected by properties: "cylinder r=12 hole", "plane x=100", "x=0..20 z=0..5", "colour=#ff0000", "face 7".
 
-A selector is a list of conditions that all have to hold:
+A selector is a list of conditions that a face must all fulfil:
 
 ==========================  ===========================================================================================
 condition                   faces
 ==========================  ===========================================================================================
-plane, cylinder, ...        of that kind (`FACE_KINDS`)
-r=12, d=24                  cylinder or sphere of that radius or diameter
+plane, cylinder, ...        faces of that kind (`FACE_KINDS`)
+r=12, d=24                  cylinders and spheres of that radius or diameter
 hole, outside               round faces with the material outside, or inside
-axis=z, axis=1,1,0          cylinders along it, in either sense
-normal=-z, normal=0,0,1     planes that look that way
-x=10                        planes that lie there, cylinders whose axis and spheres whose centre does
-x=0..10                     all of the face lies between
-name=bore, colour=#ff0000   with that name or colour in the file
-near=0,0,5                  of those that are left: the one whose centroid is nearest
-face 7                      number 7 of the list
-box                         nothing of its own: it may stand before ranges
+axis=z, axis=1,1,0          cylinders along this direction or opposite to it
+normal=-z, normal=0,0,1     planes with this outward normal
+x=10                        planes at this coordinate, cylinders whose axis and spheres whose centre is there
+x=0..10                     faces that lie completely in this range
+name=bore, colour=#ff0000   faces with that name or colour in the file
+near=0,0,5                  of the faces that meet all other conditions, the one with the nearest centroid
+face 7                      number 7 in the list of faces
+box                         no condition; the word may introduce ranges
 ==========================  ===========================================================================================
 """
 
@@ -34,7 +34,7 @@ from fe_models.foundation.words import nearest, quoted
 __all__ = ["KEYS", "chosen_faces", "face_words"]
 
 RADIUS = 1e-4  #: relative difference of radii up to which they are equal
-PLACE = 1e-5  #: difference of positions over the body size, up to which they are equal
+PLACE = 1e-5  #: difference of positions divided by the body size, up to which they are equal
 ANGLE = 1e-4  #: angle between directions up to which they are equal [rad]
 KEYS = ("r", "d", "axis", "normal", "x", "y", "z", "name", "colour", "color", "near", "face")
 WORDS = (*FACE_KINDS, "hole", "outside", "box", "face", *(f"{key}=" for key in KEYS if key != "face"))
@@ -57,7 +57,8 @@ def chosen_faces(text: str, faces: Sequence[CadFace]) -> list[CadFace]:
     Raises
     ------
     InterfaceError
-        If a word is unknown, a number is none, or no face meets all conditions; with what there is.
+        If a word is unknown, a number is invalid, or no face meets all conditions; the message lists the faces of the
+        body.
     """
     outer = [face for face in faces if not face.is_inner]
     size = float(np.linalg.norm(np.ptp([[*face.lo, *face.hi] for face in outer], axis=0))) if outer else 1.0

@@ -22,7 +22,7 @@ OPTIONS = {
     "Mesh.Binary": 1,
     "Mesh.SaveAll": 0,  # only the named groups: curves and unnamed faces would be noise to a reader
     "Mesh.SecondOrderLinear": 0,
-    "Mesh.HighOrderOptimize": 1,  # mid-side nodes go onto the curved faces, the elements behind them give way
+    "Mesh.HighOrderOptimize": 1,  # mid-side nodes move to the curved faces, and the elements behind them adapt
     "Mesh.Optimize": 1,
     "Mesh.OptimizeNetgen": 1,
 }
@@ -35,7 +35,7 @@ def load_gmsh() -> ModuleType:
     Raises
     ------
     MeshingError
-        If it is not installed, or a system library it needs is missing; the text says how to get it.
+        If it is not installed, or a system library that it needs is missing; the message says how to install it.
     """
     try:
         return extra_module("gmsh", extra="mesh", purpose="meshing a part")
@@ -51,9 +51,9 @@ def gmsh_model(name: str, options: Mapping[str, float | str]) -> Iterator[Module
     Parameters
     ----------
     name
-        Of the model.
+        Name of the model.
     options
-        Options of gmsh beside those that make meshes repeatable: numbers and texts.
+        Options of gmsh, numbers or texts, in addition to those that make meshes repeatable.
     """
     gmsh = load_gmsh()
     was_open = bool(gmsh.isInitialized())
@@ -97,12 +97,12 @@ def gmsh_call(where: str, *, advice: str) -> Iterator[None]:
     where
         Beginning of the message.
     advice
-        Its end: what to do.
+        End of the message, which says what to do.
 
     Raises
     ------
     MeshError
-        In place of the bare exceptions of gmsh.
+        If gmsh raises an exception.
     """
     try:
         with _quiet():

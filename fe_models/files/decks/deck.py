@@ -1,7 +1,7 @@
 """Content of a deck of any program: mesh, materials, sections, attachments, couplings, supports, loads, ledger.
 
-Nodes are referred to by groups of the mesh (`RawMesh.node_sets`). Readers add groups such as `node_17` or `rbe2_5` for
-what the deck refers to by number, so that a job can name it.
+Nodes are referred to by groups of the mesh (`RawMesh.node_sets`). For nodes that the deck refers to by number, readers
+add groups such as `node_17` or `rbe2_5`, so that a job can name them.
 """
 
 from collections.abc import Mapping
@@ -47,8 +47,8 @@ class DeckMaterial:
     def in_plane_strain(self, name: str) -> "DeckMaterial | None":
         """Return the sheet material for plane strain of this isotropic material; None for other materials.
 
-        eps_z = 0 gives sigma_z = nu (sigma_x + sigma_y). In the plane the material is then a sheet in plane stress with
-        E' = E/(1 - nu²), nu' = nu/(1 - nu), and G as before.
+        eps_z = 0 gives sigma_z = nu (sigma_x + sigma_y). In the plane, the material then behaves like a sheet in plane
+        stress with E' = E/(1 - nu²), nu' = nu/(1 - nu) and the same G.
         """
         E, nu = self.young, self.poisson
         if not isinstance(E, float) or not isinstance(nu, float):
@@ -90,8 +90,8 @@ class ShellSection:
     layers: tuple[DeckLayer, ...] = ()  #: layers from bottom to top
     direction: Vector = (1.0, 0.0, 0.0)  #: direction whose projection onto the shell is angle 0 of the layers
     orientation: str = ""  #: name of the axes of the material; used only while the deck is read
-    bending_ratio: float = 1.0  #: bending stiffness over that of the material and thickness
-    shear_ratio: float = 1.0  #: transverse shear stiffness over that of the material and thickness
+    bending_ratio: float = 1.0  #: bending stiffness divided by that of the material and thickness
+    shear_ratio: float = 1.0  #: transverse shear stiffness divided by that of the material and thickness
     #: rows of [[A, B], [B, D]] over N_x N_y N_xy M_x M_y M_xy; if given, the section has neither material nor layers
     stiffness: tuple[tuple[float, ...], ...] = ()
     #: rows of the transverse shear stiffness; used together with `stiffness`
@@ -112,7 +112,7 @@ class LineSection:
     group: str
     material: str
     shape: Mapping[str, object]  #: keys of a table [sections.NAME] of a job: shape and dimensions
-    #: vector towards the local y axis; None: each line has its own in the mesh, or none
+    #: vector towards the local y axis; None: each line has its own vector in the mesh, or none
     orientation: Vector | None = None
     offset: tuple[float, float] = (0.0, 0.0)
     shear: bool = True

@@ -7,20 +7,20 @@ from scipy.linalg import qr
 
 __all__ = ["Row", "solved_equations"]
 
-NEGLIGIBLE = 1e-14  #: coefficient over the largest one, below which it counts as zero
+NEGLIGIBLE = 1e-14  #: coefficient divided by the largest one, below which it counts as zero
 Row = dict[tuple[int, int], float]  #: coefficient of each (node, component in basic axes); the sum of all terms is zero
 
 
 def solved_equations(rows: Iterable[tuple[tuple[int, int], Row]]) -> tuple[list[Row], list[tuple[int, int]]]:
     """Return equations whose first component can be eliminated, and (node, count) of equations without any.
 
-    The first terms of some equations are components of one node along its own axes. These equations are solved together
-    for as many components of the node in basic axes. Pivoting chooses the components that are determined best.
+    If the first terms of n equations are components of one node along its own axes, these equations are solved together
+    for n components of the node in basic axes. Pivoting selects the components that are determined best.
 
     Parameters
     ----------
     rows
-        (node, 0 for its translations or 3 for its rotations) to be eliminated, and the equation.
+        Node of the component to be eliminated with 0 for its translations or 3 for its rotations, and the equation.
     """
     together: dict[tuple[int, int], list[Row]] = {}
     for lead, row in rows:

@@ -3,11 +3,11 @@
 NAME        read
 NAME=value  refused unless it is blank or has this value, the default
 NAME!       refused unless it is blank
-NAME~       says nothing about mass, stiffness or damping
+NAME~       without effect on mass, stiffness or damping
 NAME^       damping or the like, which is left out and named in the ledger
 -           blank in every deck
-...         the fields before it repeat, or the reader takes the rest itself
-...^        the reader leaves the rest out and names it in the ledger
+...         the preceding fields repeat, or the reader handles the remaining fields itself
+...^        the reader leaves the remaining fields out and names them in the ledger
 """
 
 import re

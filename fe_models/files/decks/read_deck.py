@@ -34,14 +34,14 @@ def read_deck(path: str | Path, *, program: str | None = None) -> Deck:
     Parameters
     ----------
     path
-        The file; its suffix names the program (`DECK_FORMATS`).
+        Path of the file; its suffix determines the program (`DECK_FORMATS`).
     program
-        "calculix" (the default) or "abaqus" for decks (.inp) that both read, but integrate differently.
+        "calculix" (the default) or "abaqus" for decks (.inp), because the two programs integrate elements differently.
 
     Raises
     ------
     MeshError
-        If the file is missing, of another kind, or damaged. What it holds and is not taken over is in the ledger.
+        If the file is missing, of another kind, or damaged. Content that is not converted is in the ledger.
     """
     path = Path(path)
     where = f"deck {path}"

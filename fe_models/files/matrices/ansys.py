@@ -20,7 +20,7 @@ def read_full_part(path: Path, request: Request) -> ForeignMatrices:
     Raises
     ------
     MatrixError
-        As `read_full`.
+        If `read_full` raises it.
     """
     read = read_full(path)
     return ForeignMatrices(
@@ -40,7 +40,7 @@ def read_sub_part(path: Path, request: Request) -> ForeignMatrices:
     Raises
     ------
     MatrixError
-        As `read_sub`.
+        If `read_sub` raises it.
     """
     read = read_sub(path)
     numbers = np.array(sorted(read.positions), dtype=np.int64)

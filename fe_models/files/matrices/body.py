@@ -25,7 +25,7 @@ from fe_models.meshes.numbering import Numbering
 __all__ = ["MatrixReport", "body_from_foreign", "nodes_of", "with_geometry", "without_supports"]
 
 
-# supports taken out of a stiffness, where the rows of what they hold exist --------------------------------------------
+# removal of supports from a stiffness that still has the rows of the supported dofs -----------------------------------
 
 
 def without_supports(
@@ -33,23 +33,23 @@ def without_supports(
 ) -> tuple[sp.csc_array, str]:
     """Return the stiffness without supports, and a description of the removed supports.
 
-    A support between a node and the ground adds to the block K_nn of that node and nowhere else. In a free body the
-    rigid-body motions Psi about n, which are 1 on the dofs of n, meet no force, K_nn + K_n,rest Psi_rest = 0:
+    A support between node n and the ground only changes the block K_nn. In a free body, the rigid-body motions Psi
+    about n, which are 1 on the dofs of n, cause no force: K_nn + K_n,rest Psi_rest = 0.
 
-    (1) rows that answer translations, or all of their own stiffness: those of the supported nodes
-    (2) K_nn = -K_n,rest Psi_rest: nothing is subtracted from K_nn, in which a penalty of 1e36 leaves no digits
-    (3) the result is free in all six motions, of which turns were not used by (2) on nodes without rotations
+    (1) find the supported nodes: those with rows that resist rigid-body motion
+    (2) set K_nn = -K_n,rest Psi_rest. Nothing is subtracted from K_nn, because a penalty of 1e36 leaves no digits in it
+    (3) check that the result is free in all six motions; (2) does not use rotations at nodes without rotations
 
     Parameters
     ----------
     where
-        For messages.
+        Name of the matrices, for messages.
     K, M
-        (n_dof, n_dof).
+        Stiffness and mass, (n_dof, n_dof).
     nodes
-        (n_nodes, 3) [m].
+        Node positions, (n_nodes, 3) [m].
     dofs
-        (node, component), (n_dof, 2).
+        Node index and component of each row, (n_dof, 2).
 
     Raises
     ------
@@ -102,7 +102,7 @@ def nodes_of(read: ForeignMatrices) -> NodeCloud:
     Raises
     ------
     MatrixError
-        If they bring none.
+        If they contain none.
     """
     if read.nodes is None or read.node_numbers is None:
         raise MatrixError(
@@ -115,8 +115,8 @@ def nodes_of(read: ForeignMatrices) -> NodeCloud:
 def with_geometry(read: ForeignMatrices, geometry: Mesh | NodeCloud) -> ForeignMatrices:
     """Return the record with the nodes of a deck or mesh, and with dofs for its rows if the files name none.
 
-    Without a list of dofs the rows are taken as 3 (or 6) to a node in ascending order of their numbers 1, 2, ..., of
-    which a note tells; whether that is so, the stiffness says of a free body: in another order it is not free.
+    Without a list of dofs, 3 (or 6) rows are assigned to each node, in ascending order of the node numbers 1, 2, ...; a
+    note reports this. The stiffness of a free body shows whether it is correct: in another order it is not free.
 
     Raises
     ------
@@ -161,28 +161,28 @@ def body_from_foreign(
 ) -> FEBody:
     """Return the body of imported matrices with the nodes of a deck or mesh.
 
-    (1) dofs and nodes of the rows (`with_geometry`); the nodes of the body are those of the geometry, in its order
-    (2) rows without any stiffness and mass leave: what they hold shows as a support in (4)
-    (3) where asked for, supports whose rows exist are taken out (`without_supports`)
-    (4) `body_from_matrices`: free, or held as it is said to be; exact mass moments where M is M_s ⊗ 1₃
+    (1) find dofs and nodes of the rows (`with_geometry`); the body has the nodes of the geometry, in the same order
+    (2) remove constrained rows and rows without stiffness and mass; (4) finds the supports that this causes
+    (3) if requested, remove supports whose rows exist (`without_supports`)
+    (4) make the body (`body_from_matrices`): free, or fixed as declared; mass moments are exact if M is M_s ⊗ 1₃
 
     Parameters
     ----------
     read
-        Of `read_matrices`.
+        Matrices from `read_matrices`.
     geometry
-        Of `read_geometry`; None: the files bring their nodes.
+        Mesh or nodes from `read_geometry`; None: the matrix files contain the nodes.
     name, units, interfaces, held, repair_mass, accept
-        As for `body_from_matrices`; interfaces by indices of the nodes of the geometry.
+        As for `body_from_matrices`; interfaces refer to node indices of the geometry.
     remove_supports
-        Whether springs and penalties between nodes and the ground are taken out of K.
+        Whether springs and penalties between nodes and the ground are removed from K.
 
     Raises
     ------
     MatrixError
         If stiffness, mass, dofs or nodes are missing or do not fit.
     BodyError
-        As `body_from_matrices`.
+        If `body_from_matrices` raises it.
     """
     where = where_of(read)
     read = with_geometry(read, geometry if geometry is not None else nodes_of(read))  # (1)

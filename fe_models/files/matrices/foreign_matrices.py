@@ -24,10 +24,10 @@ ROLES = ("K", "M", "D")
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class ForeignMatrices:
-    """Matrices, the dofs of their rows and the nodes of these, as far as the files contain them.
+    """Matrices, the dofs of their rows, and the nodes of these dofs, as far as the files contain them.
 
-    A reader of one file fills what that file knows and leaves the rest; `joined` puts the files of a model together.
-    Matrices are full: a reader that meets one stored triangle mirrors it, and says in `triangle` which it was.
+    The reader of one file sets the fields that the file contains; `joined` combines the files of a model. Matrices have
+    both triangles: if a file has only one, its reader mirrors it and records the stored one in `triangle`.
 
     Parameters
     ----------
@@ -54,9 +54,9 @@ class ForeignMatrices:
     triangle
         Stored triangle of each matrix by its name: both, lower, upper, diagonal.
     constrained
-        Rows that are held, (n,).
+        Constrained rows, (n,).
     removed
-        Dofs that have no rows because they are held, (node number, component), (n, 2).
+        Dofs without rows because they are constrained, (node number, component), (n, 2).
     program
         Program that wrote the files, if they name it.
     files
@@ -156,9 +156,9 @@ def pair_keys(dofs: IntArray) -> IntArray:
 def joined(parts: Iterable[ForeignMatrices], where: str) -> ForeignMatrices:
     """Combine the contents of several files of one model.
 
-    (1) each matrix from the one file that has it; rows in the order of the first file that names their dofs
-    (2) rows that another file lacks are zero there (dofs without mass), of which a note tells
-    (3) nodes, systems, loads, notes and files are gathered
+    (1) take each matrix from the only file that has it; rows are in the order of the file with most dofs
+    (2) rows that a file lacks are zero in its matrices (dofs without mass); a note reports them
+    (3) collect nodes, systems, loads, notes and files
 
     Raises
     ------

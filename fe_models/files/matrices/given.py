@@ -32,7 +32,7 @@ __all__ = ["ScalarMassModel", "body_from_matrices", "body_from_npz", "scalar_mas
 
 log = logging.getLogger(__name__)
 
-PATTERN_TOLERANCE = 1e-10  #: largest |M - M_s ⊗ 1₃| / |M| that is rounding of the other program
+PATTERN_TOLERANCE = 1e-10  #: largest |M - M_s ⊗ 1₃| / |M| that is a rounding error of the other program
 INTERFACE_KEYS = ("kind", "nodes", "reference", "triad", "weights")
 
 
@@ -271,7 +271,7 @@ def wave_speeds(body: FEBody) -> Array:
 def scalar_mass_of(body: FEBody) -> sp.csr_array | None:
     """Return M_s, (n_nodes, n_nodes), if M is M_s ⊗ 1₃ for translations and zero elsewhere; otherwise None.
 
-    None means that rotations carry mass, that directions differ or are coupled, or that a node lacks a direction.
+    None means that rotations have mass, that directions differ or are coupled, or that a node lacks a direction.
     """
     M = sp.coo_array(body.M)
     node, component = body.dofs[M.row, 0], body.dofs[M.row, 1]
@@ -338,7 +338,7 @@ def body_from_npz(
     Parameters
     ----------
     path
-        The archive.
+        Path of the archive.
     name
         Name of the body; None: the name of the file without its suffix.
     units

@@ -1,4 +1,4 @@
-"""Matrices of MATLAB files: version 5 by SciPy, version 7.3 by h5py; with nodes and dofs where they are in the file."""
+"""Matrices of MATLAB files: version 5 by SciPy, version 7.3 by h5py; with nodes and dofs if the file has them."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -53,7 +53,7 @@ def read_matlab_7(path: Path, request: Request) -> ForeignMatrices:
     Raises
     ------
     MatrixError
-        As `from_named`, and if an array claims more memory than its bytes can fill.
+        If `from_named` raises it, or an array declares more memory than its stored bytes can fill.
     """
     import h5py
 
@@ -89,13 +89,13 @@ def array_of(where: str, name: str, entry: Any) -> np.ndarray:
 def from_named(where: str, content: Mapping[str, Any], request: Request, program: str) -> ForeignMatrices:
     """Return the record of named arrays: matrices, and `dofs` and `nodes` with numbers from 1.
 
-    `dofs`: (node number, component 1-6) of every row, or (number, 0) of a modal coordinate, (n_dof, 2); `nodes`:
-    (number, x, y, z) or, numbered 1, 2, ..., (x, y, z), one row each.
+    `dofs` contains (node number, component 1-6) of every row, or (number, 0) for a modal coordinate, (n_dof, 2).
+    `nodes` has one row for each node: (number, x, y, z), or (x, y, z) if nodes are numbered 1, 2, ....
 
     Raises
     ------
     MatrixError
-        If no matrix is found, it is complex or no matrix of numbers, or dofs and nodes are not as they should be.
+        If no matrix is found, a matrix is complex or does not consist of numbers, or dofs or nodes are invalid.
     """
     chosen = request.chosen(where, NAMED, content)
     matrices, triangle = {}, {}

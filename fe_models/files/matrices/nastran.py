@@ -48,15 +48,15 @@ class _Entries:
 def dmig_matrices(cards: Iterable[Card]) -> tuple[NastranMatrix, ...]:
     """Return the matrices of the DMIG cards, in the order of their headers.
 
-    Rows and columns are those that occur, by number of the point and component; a square matrix has the same for both.
-    Of a symmetric one (form 6) the cards hold each pair once: it is mirrored. A rectangular one (form 9) has columns
-    1 to NCOL.
+    Rows and columns are those that occur on the cards, sorted by point number and component; a square matrix has the
+    same for both. For a symmetric matrix (form 6) the cards contain each pair once, and the matrix is mirrored. A
+    rectangular matrix (form 9) has columns 1 to NCOL.
 
     Raises
     ------
     MatrixError
-        If a matrix has no header or two, an entry or (form 6) both entries of a pair are listed, or a form, a type, a
-        component or a column is unknown.
+        If a matrix has no header or two headers, an entry is listed twice (form 6: also if both entries of a pair are
+        listed), or a form, a type, a component or a column is unknown.
     """
     found: dict[str, _Entries] = {}
     for card in cards:
@@ -195,7 +195,7 @@ def read_op4_part(path: Path, request: Request) -> ForeignMatrices:
     Raises
     ------
     MatrixError
-        If the file is damaged, has no stiffness or mass, or complex ones.
+        If the file is damaged, or has no stiffness and mass, or complex ones.
     """
     where = f"matrices {path}"
     matrices = read_op4(path)
@@ -207,7 +207,7 @@ def read_op4_part(path: Path, request: Request) -> ForeignMatrices:
             if any(card.name == "EXTRN" for card in cards):
                 dofs = extrn_rows(where, cards)
                 part = _with_points(cards)
-                notes.append(f"rows and places of {path.name} from {beside.name}, beside it")
+                notes.append(f"rows and node positions of {path.name} were read from {beside.name} in the same folder")
             break
     if dofs is None:
         return _part(where, matrices, request)
@@ -220,7 +220,7 @@ def read_op2_part(path: Path, request: Request) -> ForeignMatrices:
     Raises
     ------
     MatrixError
-        As `read_op4_part`.
+        If the file is damaged, or has no stiffness and mass, or complex ones.
     """
     return _part(f"matrices {path}", read_op2(path), request)
 
@@ -268,7 +268,7 @@ def _part(
     **points: object,
 ) -> ForeignMatrices:
     """Return the named matrices of a file, with the rows of DMIG matrices unified."""
-    there = [matrix for matrix in matrices if matrix.matrix.nnz]  # Nastran writes a single zero for what it has not
+    there = [matrix for matrix in matrices if matrix.matrix.nnz]  # Nastran writes a single zero for a missing matrix
     by_name = {matrix.name: matrix for matrix in there}
     chosen = request.chosen(where, USUAL, by_name)
     picked = {role: matrix_named(where, there, name) for role, name in chosen.items()}

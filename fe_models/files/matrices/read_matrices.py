@@ -57,7 +57,7 @@ __all__ = [
 ]
 
 
-# dofs that another program writes in local axes of their nodes, turned to basic axes: K_basic = D K Dᵀ ----------------
+# transformation of dofs in local axes of their nodes to basic axes: K_basic = D K Dᵀ ----------------------------------
 
 
 ORTHONORMAL = 1e-8  #: largest |Rᵀ R - 1| of axes from files with nine digits
@@ -72,8 +72,8 @@ def in_basic_axes(read: ForeignMatrices) -> ForeignMatrices:
     Raises
     ------
     MatrixError
-        If axes are not orthonormal and right-handed, or a turned node lacks a component: what is held in oblique axes
-        has no row of its own in basic ones.
+        If axes are not orthonormal and right-handed, or a node with local axes lacks a component: a constraint in
+        oblique axes does not correspond to one row in basic axes.
     """
     if not read.systems:
         return read
@@ -127,7 +127,7 @@ def in_basic_axes(read: ForeignMatrices) -> ForeignMatrices:
 
 
 # scipy files ----------------------------------------------------------------------------------------------------------
-# Matrices that Python programs keep: `scipy.sparse.save_npz`, arrays of `numpy.savez`; and Harwell-Boeing files.
+# Matrices from Python programs (`scipy.sparse.save_npz`, arrays of `numpy.savez`), and Harwell-Boeing files.
 
 
 SPARSE = {"format", "shape", "data"}  #: keys that `save_npz` always writes
@@ -141,7 +141,7 @@ def read_npz(path: Path, request: Request) -> ForeignMatrices:
     Raises
     ------
     MatrixError
-        If it holds something else, or claims more memory than its bytes can fill.
+        If it contains something else, or declares more memory than its bytes can fill.
     """
     where = f"matrices {path}"
     with zipfile.ZipFile(path) as archive:
@@ -167,12 +167,12 @@ def is_harwell_boeing(head: bytes) -> bool:
 
 
 def read_harwell_boeing(path: Path, request: Request) -> ForeignMatrices:
-    """Read an assembled real matrix; of a symmetric one the file has one triangle.
+    """Read an assembled real matrix; for a symmetric matrix the file has one triangle.
 
     Raises
     ------
     MatrixError
-        If it is complex, a pattern, in elements, rectangular, or its header does not fit its size.
+        If it is complex, a pattern, unassembled or rectangular, or its header does not fit its size.
     """
     where = f"matrices {path}"
     with path.open("rb") as file:
@@ -183,11 +183,12 @@ def read_harwell_boeing(path: Path, request: Request) -> ForeignMatrices:
     n_bytes = path.stat().st_size
     if len(counts) < 3 or not all(word.isdigit() for word in counts[:3]) or max(map(int, counts[:3])) > n_bytes:
         raise MatrixError(
-            f"{where}, line 3: expected rows, columns, entries of a file of {n_bytes} bytes, got {counts}"
+            f"{where}, line 3: expected the numbers of rows, columns and entries, none above the file size of "
+            f"{n_bytes} bytes; got {counts}"
         )
     role = request.role_of(where, role_by_stem(path), ", and it is not named K.rsa, M.rsa, stiffness.hb, mass.hb")
     text = path.read_text("ascii", "replace").replace(lines[2], "RUA" + lines[2][3:], 1)
-    stored = sp.csc_array(scipy.io.hb_read(io.StringIO(text), spmatrix=False))  # which reads one triangle as it stands
+    stored = sp.csc_array(scipy.io.hb_read(io.StringIO(text), spmatrix=False))  # one triangle is not mirrored
     if stored.shape[0] != stored.shape[1]:
         raise MatrixError(f"{where}: {role}: expected a square matrix, got {stored.shape[0]} x {stored.shape[1]}")
     if not np.isfinite(stored.data).all():
@@ -230,22 +231,23 @@ def read_matrices(files: MatrixFiles, *, names: Mapping[str, str] | None = None)
     Parameters
     ----------
     files
-        One path; several, each with a part of the model (stiffness, mass, list of dofs); or role -> path, with roles
-        "K", "M", "D" where a file does not say which matrix it holds, and "dofs" for a list of rows. Files of CalculiX
-        without roles bring those of the same name beside them along, which the notes say.
+        One path; several paths, each with a part of the model (stiffness, mass, list of dofs); or paths by role. The
+        roles are "K", "M", "D" for files that do not state which matrix they contain, and "dofs" for a list of rows.
+        For CalculiX files without roles, the other files with the same name in the folder are read too; the notes
+        report them.
     names
-        Role -> name of its matrix, for files that hold several by name and not under the usual ones.
+        Name of the matrix for each role, for files with several named matrices and without the usual names.
 
     Returns
     -------
     ForeignMatrices
-        All that the files say, rows in basic axes; what is missing is None.
+        Content of all files, with rows in basic axes; missing data are None.
 
     Raises
     ------
     MatrixError
-        If a file is missing, damaged, of an unknown kind, or could only be read with another meaning than its own
-        program gives it; if the files do not fit together.
+        If a file is missing, damaged or of an unknown kind, if it could only be read with another meaning than in its
+        own program, or if the files do not fit together.
     """
     if isinstance(files, (str, Path)):
         listed: list[tuple[str | None, Path]] = [(None, Path(files))]

@@ -25,7 +25,7 @@ class Request:
         Raises
         ------
         MatrixError
-            If nobody says it.
+            If neither the caller nor the file states it.
         """
         if (role := self.role or found) is not None:
             return role
@@ -42,14 +42,14 @@ class Request:
         Parameters
         ----------
         usual
-            Role -> names that its program gives it, in lower case, the first that is there is taken.
+            Names that the program uses for each role, in lower case; the first one that exists is used.
         available
-            The names in the file.
+            Names in the file.
 
         Raises
         ------
         MatrixError
-            If the caller names one that is not there, or nothing is found.
+            If the caller requests a missing name, or nothing is found.
         """
         found = {}
         lower = {name.lower(): name for name in available}

@@ -25,8 +25,8 @@ def full_matrix(
 ) -> tuple[sp.csc_array, str]:
     """Return the full matrix from listed entries, (n, n), and which triangle was stored.
 
-    An entry listed once for each pair is mirrored: a matrix with one triangle only is no symmetric matrix, so nothing
-    is guessed. Where both entries of pairs are listed they have to be equal.
+    If only one entry of each pair is listed, it is mirrored. This is not a guess, because a matrix with entries in one
+    triangle only cannot be symmetric. If both entries of pairs are listed, they must be equal.
 
     Parameters
     ----------
@@ -37,14 +37,14 @@ def full_matrix(
     n
         Number of rows.
     declared
-        What the file says: "symmetric" (each pair once) or "general" (both); None: nothing.
+        Declaration in the file: "symmetric" (each pair once) or "general" (both entries); None: no declaration.
 
     Returns
     -------
     matrix
-        Both triangles.
+        Matrix with both triangles.
     triangle
-        "both", "lower", "upper", "diagonal", or "each pair once", on either side.
+        "both", "lower", "upper", "diagonal", or "each pair once" (in either triangle).
 
     Raises
     ------

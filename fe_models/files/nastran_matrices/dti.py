@@ -19,8 +19,8 @@ END = "ENDREC"
 def grid_rows(where: str, cards: list[Card], table: str, n_rows: int) -> IntArray:
     """Return (id, component) of each row, (n_rows, 2), from the table TUG1.
 
-    Components are 0 to 5 of a grid point, `SCALAR` for the first row of a scalar point and `EMPTY` for those behind it
-    (Nastran gives it as many as a grid point, all of them zero).
+    Components are 0 to 5 for a grid point. A scalar point has as many rows as a grid point: the first one has the
+    component `SCALAR`, the others are zero and have the component `EMPTY`.
 
     Raises
     ------
@@ -46,7 +46,7 @@ def element_rows(where: str, cards: list[Card], table: str, n_rows: int) -> IntA
     Raises
     ------
     MatrixError
-        As `grid_rows`.
+        If the table is missing or damaged, or its rows are not the n_rows of the matrix.
     """
     rows: list[tuple[int, int, int]] = []
     for kind, number, count, first in _entries(where, cards, table):

@@ -14,7 +14,7 @@ __all__ = ["is_op2", "read_op2"]
 
 MOST_BYTES = 2_000_000_000  #: largest size of a full matrix, as pyYeti reads it [bytes]
 SMALL_BYTES = 50_000_000  #: size of a full matrix that is accepted from any file [bytes]
-FULLNESS = 200  #: size of a full matrix over that of its file, above which the file is damaged or nearly empty
+FULLNESS = 200  #: size of a full matrix divided by that of its file; above it, the file is damaged or nearly empty
 
 
 def is_op2(content: bytes) -> bool:
@@ -28,8 +28,8 @@ def read_op2(path: str | Path) -> tuple[NastranMatrix, ...]:
     Raises
     ------
     MatrixError
-        If the file is missing, truncated, damaged or no OP2 file, if it has no matrices, or one that is too large in
-        full.
+        If the file is missing, truncated, damaged or no OP2 file, if it has no matrices, or if one of them is too large
+        as a full matrix.
     MissingExtraError
         If pyYeti is not installed.
     """

@@ -14,12 +14,12 @@ from fe_models.files.nastran_matrices.raw_matrix import NastranMatrix
 __all__ = ["is_op4", "read_op4", "read_text"]
 
 
-# OP4 files as text: numbers in columns of fixed width, in the format that the header of a matrix names ----------------
+# OP4 files as text: numbers in columns of fixed width, in the format given in the header of a matrix ------------------
 
 
 DEFAULT = (5, 16)  #: numbers in a line and their width, in the format 5E16.9 of a header without format
 FORMAT = re.compile(rb"(?:1P,?)?\s*(\d+)[ED](\d+)\.\d+(?:E\d+)?$", re.IGNORECASE)
-NO_LETTER = re.compile(r"(?<=\d)([+-]\d+)$")  #: exponent of three digits, which leaves no room for the letter E
+NO_LETTER = re.compile(r"(?<=\d)([+-]\d+)$")  #: exponent with three digits, before which the letter E is omitted
 
 
 def read_text(where: str, path: Path) -> Iterator[NastranMatrix]:
@@ -243,23 +243,24 @@ def is_op4(content: bytes) -> bool:
 def read_op4(path: str | Path) -> tuple[NastranMatrix, ...]:
     """Read all matrices of an OP4 file.
 
-    Binary with integers of 32 and 64 bits in either byte order, dense columns, strings and bigmat strings, in single
-    and double precision, real and complex; text in the formats that its headers name.
+    Supported are binary files with integers of 32 and 64 bits in either byte order, with dense columns, strings and
+    bigmat strings, in single and double precision, real and complex; and text files in the formats given in their
+    headers.
 
     Parameters
     ----------
     path
-        The file.
+        Path of the file.
 
     Returns
     -------
     tuple
-        In the order of the file; names may occur twice (`matrix_named`).
+        Matrices in the order of the file; names may occur twice (`matrix_named`).
 
     Raises
     ------
     MatrixError
-        If the file is missing, truncated, damaged or no OP4 file, or if sizes in it do not fit it or each other.
+        If the file is missing, truncated, damaged or no OP4 file, or if sizes in it do not fit the file or each other.
     """
     path = Path(path)
     where = f"OP4 file {path}"

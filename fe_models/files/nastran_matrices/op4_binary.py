@@ -20,8 +20,8 @@ NOT_BIGMAT = 65536  #: number of rows from which strings need a head of more tha
 def read_binary(where: str, path: Path) -> Iterator[NastranMatrix]:
     """Yield the matrices of a binary OP4 file.
 
-    The columns of a matrix take as much memory as they have in the file, half as much again for doubles; the sizes in
-    its header take none.
+    Memory is only used for columns that are in the file: about their size in the file, or 1.5 times that for doubles.
+    The sizes declared in a header use no memory.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def read_binary(where: str, path: Path) -> Iterator[NastranMatrix]:
         capacity = (len(words) - at) // (reals if is_single else 2 * reals)
         index = np.int32 if capacity < LARGEST else np.int64
         indptr = np.zeros(n_columns + 1, index)
-        indices = np.empty(capacity, index)  # more than needed, never touched, given back
+        indices = np.empty(capacity, index)  # more than needed; the unused rest is never touched
         values = np.empty(capacity * reals, np.int32 if is_single else np.int64)
         none = np.empty(0, np.int64 if is_single else np.int32)
         status, at, count, column = op4_kernels.read_columns(
@@ -107,7 +107,7 @@ def require_sizes(here: str, n_columns: int, n_rows: int, kind: int, size: int) 
 
 
 def _name(words: np.ndarray, step: int, swapped: bool) -> str:
-    """Return the name of a header; with integers of 64 bits its four letters stand before four blanks, twice."""
+    """Return the name of a header; with 64-bit integers it is written as twice four letters and four blanks."""
     text = (words.byteswap() if swapped else words).tobytes()
     if step == 2 and not text[4:8].strip(b" \0"):
         text = text[:4] + text[8:12]

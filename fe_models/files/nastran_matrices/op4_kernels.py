@@ -1,7 +1,8 @@
-"""Compiled loops over the records of binary OP4 files; imported where they are used, numba takes half a second.
+"""Compiled loops over the records of binary OP4 files; imported only when used, because numba takes half a second.
 
-A file is an array of 4-byte words in the order of this machine. Its integers have `step` words (1 or 2), its reals of
-8 bytes two; in files of the other byte order (`is_swapped`: words turned one by one) the first of two is the high one.
+A file is an array of 4-byte words in the byte order of this machine. Integers have `step` words (1 or 2), and 8-byte
+reals have two. For files with the other byte order (`is_swapped`), the bytes of each word have been reversed, so that
+the first of two words is the high one.
 """
 
 import numpy as np
@@ -36,33 +37,33 @@ def integer(words, at, step, is_swapped):
 
 @jit
 def read_columns(words, at, step, is_swapped, n_rows, n_columns, is_bigmat, reals, indptr, indices, singles, doubles):
-    """Read the columns of one matrix from its first record behind the header.
+    """Read the columns of one matrix, from the first record after the header.
 
-    (1) a record: its length in bytes, column, row (0: strings), words that follow, these words, its length again
-    (2) dense column: one string from that row on
-    (3) strings, each headed by (length + 1, row) if bigmat, else by row + 65536 (length + 1), length in words
+    (1) a record consists of its length in bytes, column, row (0: strings), number of words, these words, and its length
+    (2) a dense column is one string that begins at this row
+    (3) each string begins with (length + 1, row) for bigmat, otherwise with row + 65536 (length + 1); length in words
     (4) column n_columns + 1 ends the matrix
 
     Parameters
     ----------
     reals
-        Of one entry of the matrix: 2 if it is complex.
+        Number of reals in one entry of the matrix: 2 if it is complex, otherwise 1.
     indptr, indices
-        Filled: compressed columns, (n_columns + 1,), (capacity,).
+        Output: compressed columns, (n_columns + 1,), (capacity,).
     singles, doubles
-        Filled, as words of this machine: reals of 4 bytes in the first, (capacity reals,), or of 8 bytes in the second,
-        (capacity reals,) of 64 bits; the other one is empty.
+        Output, in the byte order of this machine: reals of 4 bytes in `singles`, (capacity reals,), or of 8 bytes in
+        `doubles`, (capacity reals,) of 64 bits; the other array is empty.
 
     Returns
     -------
     status
-        `COMPLETE` or what is wrong, see `FAULTS`.
+        `COMPLETE`, or a fault (see `FAULTS`).
     at
-        The word behind the matrix, or the beginning of the record at fault.
+        Word after the matrix, or first word of the faulty record.
     count
-        Entries.
+        Number of entries.
     column
-        The column at fault, from 1.
+        Faulty column, from 1.
     """
     last, count = 0, 0
     real_size = 1 if singles.size else 2

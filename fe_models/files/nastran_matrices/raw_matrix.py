@@ -57,7 +57,7 @@ def real_square(matrix: NastranMatrix) -> sp.csc_array:
     Raises
     ------
     MatrixError
-        If it is complex or not square. Whether it is symmetric is judged with the body.
+        If it is complex or not square. Symmetry is checked later, with the body.
     """
     n_rows, n_columns = matrix.matrix.shape
     if matrix.is_complex:
@@ -71,7 +71,7 @@ def real_square(matrix: NastranMatrix) -> sp.csc_array:
 
 
 def dense_matrix(matrix: NastranMatrix, n_rows: int, n_columns: int, what: str) -> Array:
-    """Return a recovery or load matrix in full, (n_rows, n_columns); `what` says who gave these sizes."""
+    """Return a recovery or load matrix in full, (n_rows, n_columns); `what` names the source of these sizes."""
     if matrix.is_complex:
         raise MatrixError(f"{matrix.where}: is complex (type {matrix.kind}); expected real numbers")
     if matrix.matrix.shape != (n_rows, n_columns):

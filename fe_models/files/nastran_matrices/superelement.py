@@ -1,7 +1,7 @@
 """External superelements of Nastran (EXTSEOUT): matrices of an .op4 file with the rows of its .asm and .pch files.
 
-Matrices of Nastran are in the displacement systems (CD) of the grid points; here they are turned to basic axes,
-K = T K_local Tᵀ with T the axes of each grid point on the diagonal.
+Matrices of Nastran are in the displacement systems (CD) of the grid points. They are converted to basic axes:
+K = T K_local Tᵀ, where T has the axes of each grid point on its diagonal.
 """
 
 import hashlib
@@ -76,22 +76,22 @@ def read_superelement(files: str | Path | Iterable[str | Path]) -> NastranSupere
     """Read an external superelement.
 
     (1) matrices from the .op4 file: KXX or KAA, MXX or MAA, BXX, PX, MUG1, MEF1, MES1
-    (2) rows of the matrices: the EXTRN card of the .pch file, grid points and scalar points in its order
-    (3) positions and displacement systems: GRID and CORD cards of all text files, bulk data of the whole model too
+    (2) rows of the matrices: grid points and scalar points in the order of the EXTRN card of the .pch file
+    (3) positions and displacement systems: GRID and CORD cards of all text files, including bulk data of the model
     (4) rows of MUG1, MEF1, MES1: tables TUG1, TEF1, TES1 of the .pch file
-    (5) turn all of it to basic axes
+    (5) convert everything to basic axes
 
     Parameters
     ----------
     files
-        One of the .op4, .pch or .asm files, the others of the same name beside it are read too; or all files, among
-        them bulk data that defines grid points of the recovery.
+        One of the .op4, .pch or .asm files; the others with the same name in its folder are read too. Or all files,
+        including bulk data that defines grid points of the recovery.
 
     Raises
     ------
     MatrixError
-        If a file is missing or damaged, there are no or two of a kind, sizes do not fit the rows, rows of one grid
-        point are in axes that cannot be turned, or a matrix is complex.
+        If a file or matrix is missing, damaged or given twice, sizes do not fit the rows, rows of a grid point cannot
+        be converted to basic axes, or a matrix is complex.
     MeshError
         If the cards do not define the grid points.
     """
@@ -181,7 +181,7 @@ def extrn_rows(where: str, cards: list[Card]) -> IntArray:
     Raises
     ------
     MatrixError
-        If there is no such card, or it names a row twice or not by components.
+        If there is no such card, or it names a row twice, or without valid components.
     """
     found = [card for card in cards if card.name == "EXTRN"]
     if not found:

@@ -25,12 +25,12 @@ def write_op4(path: str | Path, matrices: Mapping[str, Any], *, text: bool = Fal
     Parameters
     ----------
     path
-        The file; it is replaced whole.
+        Path of the file, which is replaced as a whole.
     matrices
-        Name (letters, digits and _, 8 characters at most; written in upper case) -> real matrix, dense or sparse,
-        both triangles.
+        Real matrices by name, dense or sparse, with both triangles. A name has letters, digits and _, at most 8
+        characters, and is written in upper case.
     text
-        Numbers as text in the format 1P,3E24.16, which gives every double back, in place of binary.
+        Whether to write text in the format 1P,3E24.16, which reproduces every double, instead of binary.
 
     Raises
     ------

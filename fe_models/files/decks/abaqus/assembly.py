@@ -1,8 +1,8 @@
 """Assemblies of Abaqus: instances of parts are converted to one flat deck.
 
-Nodes and elements of the k-th instance (from 0) have k S added to their numbers, those of the assembly itself n S, with
-n instances and S a power of ten above all numbers. Sets of an instance are called `INSTANCE.set`, as Abaqus calls them;
-where a line names `INSTANCE.17`, the number of that node stands.
+The numbers of nodes and elements are shifted: by k S in the k-th of n instances (from 0), and by n S in the assembly
+itself, where S is a power of ten above all numbers. Sets of an instance are named `INSTANCE.set`, as in Abaqus. In
+lines that name `INSTANCE.17`, it is replaced by the new number of that node.
 """
 
 import re
@@ -51,7 +51,7 @@ def flat_assembly(where: str, blocks: list[DeckBlock]) -> FlatAssembly:
     Raises
     ------
     MeshError
-        If an instance names no part, or its place cannot be understood.
+        If an instance names no part, or its position is invalid.
     """
     parts, instances, own, model = _sorted(where, blocks)
     if not instances:

@@ -67,10 +67,10 @@ def _equations(here: str, block: DeckBlock, draft: Draft) -> None:
 def equations_in_basic_axes(draft: Draft) -> None:
     """Convert the equations of a deck to components in basic axes.
 
-    (1) a component of a node with axes R of its own, or those of its instance, is R[c] · u; terms of the same component
+    (1) component c of a node with its own axes R, or those of its instance, is R[c] · u; terms of the same component
         are added
-    (2) equations whose first terms are components of one such node are solved together for as many of its components in
-        basic axes; these are eliminated
+    (2) n equations whose first terms are components of one such node are solved together for n of its components in
+        basic axes, which are eliminated
     """
     turned: list[tuple[tuple[int, int], Row]] = []
     for terms, of_instance in draft.raw_equations:
@@ -281,7 +281,7 @@ def _nodes_of_elements(draft: Draft, elements: IntArray) -> IntArray:
 
 
 CANDIDATES = 6  #: number of closest faces that are tried for a node
-SHARE = 0.025  #: largest distance of a node from a face over the size of the face, if the deck gives none
+SHARE = 0.025  #: largest distance of a node from a face divided by the size of the face, if the deck gives none
 NEWTON_STEPS = 20
 
 

@@ -112,7 +112,7 @@ class Draft:
         return self.mesh.element_sets[key]
 
     def points_of(self, word: str) -> PointElements | None:
-        """Return the elements of points of a set, and take them out of those that wait for a section; None: none."""
+        """Return the point elements of a set, and stop requiring a section for them; None if there are none."""
         key = word.strip().strip('"').upper()
         found = self.points.pop(key, None)
         members = set(self.mesh.element_sets.get(key, np.zeros(0, np.int64)).tolist())

@@ -1,8 +1,8 @@
-"""Keywords of Abaqus and CalculiX: the parameters of those that are read, and those that say nothing about a body.
+"""Keywords of Abaqus and CalculiX: those that are read, with their parameters, and those without effect on a body.
 
 `PARAMETERS` lists the parameters of every keyword that is read, in the symbols of
-`fe_models.files.decks.field_table`; one that is not there is refused by name, as is a keyword on neither list: it
-may belong to the body.
+`fe_models.files.decks.field_table`. Parameters that are not listed, and keywords in neither list, are refused by name,
+because they may belong to the body.
 """
 
 from fe_models.files.abaqus_deck import DeckBlock
@@ -72,8 +72,8 @@ def parameters_of(keyword: str) -> tuple[TableField, ...]:
 def check_parameters(block: DeckBlock, ledger: Ledger) -> None:
     """Add the parameters of a keyword that are not converted to the ledger.
 
-    (1) one that is not listed is refused
-    (2) one that is listed with a default is refused where it has another value
+    (1) a parameter that is not listed is refused
+    (2) a parameter that is listed with a default is refused if it has another value
     (3) damping is left out and named
     """
     if block.keyword not in PARAMETERS:
@@ -92,8 +92,8 @@ def check_parameters(block: DeckBlock, ledger: Ledger) -> None:
             ledger.note(f"*{block.keyword}", why, line=block.line_number)
 
 
-#: keywords that change neither mass nor stiffness: steps, output, loads, controls, properties of contacts (pairs in
-#: contact are refused elsewhere), laws of heat and failure
+#: keywords that change neither mass nor stiffness: steps, output, loads, controls, properties of contacts (contact
+#: pairs are refused elsewhere), thermal and failure properties
 HARMLESS = frozenset(
     " ".join(keyword.split())
     for keyword in """

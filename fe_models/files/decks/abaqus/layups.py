@@ -16,7 +16,7 @@ __all__ = ["layers_of_block", "layups_in_axes"]
 
 #: difference of components or cosines up to which axes of orientations and normals of a flat shell count as parallel
 PARALLEL = 1e-6
-#: cosine between a shell normal and the direction of a layup, above which y replaces x or the layup is refused
+#: cosine between a shell normal and the layup direction, above which y replaces x as direction, or the layup is refused
 STEEP = 0.9
 
 
@@ -36,10 +36,10 @@ def layers_of_block(here: str, block: DeckBlock) -> tuple[DeckLayer, ...]:
 def layups_in_axes(draft: Draft) -> None:
     """Compute the layer angles of each shell from one reference direction.
 
-    (1) layers of isotropic materials have no direction: the basic x axis is taken, y where x is across the shell
-    (2) of others, the direction is axis 1 of the orientation of the first of them; a layer with a number instead of an
-        orientation is laid by this angle from the orientation of the section
-    (3) layers with orientations of their own lie at angles about the common axis 3 of a flat shell across it
+    (1) layers of isotropic materials have no direction: the basic x axis is used, or y if x is normal to the shell
+    (2) for other materials, the direction is axis 1 of the orientation of the first such layer; a layer with a number
+        instead of an orientation is at this angle from the orientation of the section
+    (3) layers with their own orientations are at angles about their common axis 3, which must be normal to a flat shell
     """
     shells, draft.shells[:] = list(draft.shells), []
     for shell in shells:

@@ -95,7 +95,8 @@ def _anisotropic(what: str, block: DeckBlock, draft: Draft, C: Array) -> None:
 def _tensor(values: list[float]) -> Array:
     """Return stress by strain, (6, 6), rows 11 22 33 12 13 23, of the 9 or 21 constants of Abaqus and CalculiX.
 
-    21: the upper triangle column by column. 9: that of the stretches, then the three shear moduli.
+    21 constants are the upper triangle column by column. 9 constants are the upper triangle of the rows 11 22 33, then
+    the three shear moduli.
     """
     C = np.zeros((6, 6))
     size = 6 if len(values) == 21 else 3
@@ -116,7 +117,7 @@ def _compliance(young: Array, poisson: Array) -> Array:
 
 
 def read_orientation(here: str, block: DeckBlock, draft: Draft) -> None:
-    """Keep axes by their name: the first through point a, the second in the plane of a and b; then turned about one."""
+    """Read named axes: the first through point a, the second in the plane of a and b; then all rotate about one."""
     given = block.parameters
     name = given.get("NAME", "").strip('"').upper()
     is_plain = given.get("SYSTEM", "RECTANGULAR").upper().startswith("R")
@@ -144,7 +145,7 @@ def _plane_axes(x: Array, y: Array) -> Array:
 
 
 def read_transform(here: str, block: DeckBlock, draft: Draft) -> None:
-    """Keep the axes of nodes: of points a and b (R), or radial, tangential and along the line from a to b (C)."""
+    """Read the axes of nodes: from points a and b (R), or radial, tangential and along the line from a to b (C)."""
     words = numbers(block.lines[0])
     a, b = np.array(words[:3]), np.array(words[3:6])
     kind = block.parameters.get("TYPE", "R").upper()
@@ -170,7 +171,8 @@ def read_transform(here: str, block: DeckBlock, draft: Draft) -> None:
 def _across(axis: Array) -> Array:
     """Return the direction that CalculiX uses as radial direction at a node on the axis.
 
-    Its first component that the axis has makes it normal to the axis; the next one is 1, the third 0.
+    If component k is the first nonzero component of the axis, component k + 1 of the direction is 1, component k + 2
+    is 0, and component k makes it normal to the axis.
     """
     first = next((k for k in (0, 1) if abs(axis[k]) > ON_AXIS), 2)
     radial = np.zeros(3)

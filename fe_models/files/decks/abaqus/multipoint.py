@@ -1,11 +1,12 @@
 """Nonlinear constraints of CalculiX, linearised at the undeformed position as in its first increment.
 
-- PLANE: nodes stay in the plane of the first three that span one. A node at Σ N_a x_a, (N_1 + N_2 + N_3 = 1), has
-  n · (u - Σ N_a u_a) = 0 with the normal n.
-- STRAIGHT: nodes stay on the line of the first two. A node at (1 - s) x_1 + s x_2 has d = u - (1 - s) u_1 - s u_2 along
-  the tangent t, two equations d_c - t_c/t_m d_m = 0 with t_m the largest of t.
-- MEANROT: the first component of a node is the mean angle of others about an axis e through their centroid, with arms r
-  across the axis: theta = 1/n Σ e · (r × u) / r².
+- PLANE: nodes stay in the plane of the first three nodes that span one. A node at Σ N_a x_a (N_1 + N_2 + N_3 = 1)
+  fulfils n · (u - Σ N_a u_a) = 0 with the normal n.
+- STRAIGHT: nodes stay on the line of the first two. For a node at (1 - s) x_1 + s x_2, the difference
+  d = u - (1 - s) u_1 - s u_2 is along the tangent t. These are two equations d_c - t_c/t_m d_m = 0, where t_m is the
+  largest component of t.
+- MEANROT: the first component of a node is the mean angle of other nodes about an axis e through their centroid:
+  theta = 1/n Σ e · (r × u) / r², where r is the position of a node normal to the axis.
 """
 
 import numpy as np
@@ -16,7 +17,7 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["LINEARISED", "read_linearised"]
 
-AWAY = 1e-3  #: largest distance of a node from its line or plane, over the size of the group
+AWAY = 1e-3  #: largest distance of a node from its line or plane, divided by the size of the group
 ROUNDOFF = 1e-9
 
 

@@ -32,7 +32,7 @@ _PLANAR = {
 }
 #: plane elements that are membranes: plane stress, and plane strain by displacements alone
 SHEETS = re.compile(r"CPS.*|CPE[34568](I|R|H|RH|IH|M|MH)?")
-ALONG = 1e-9  #: component of a vector normal to a line over its length, below which it is along the line
+ALONG = 1e-9  #: component of a vector normal to a line divided by its length, below which it is along the line
 
 
 def read_section(here: str, block: DeckBlock, draft: Draft) -> None:
@@ -182,8 +182,8 @@ def _beam_section(here: str, block: DeckBlock, draft: Draft) -> None:
     offset = (-offsets[0] * float(scale[0]) + 0.0, -offsets[1] * float(scale[1]) + 0.0)
     if uneven is not None:
         shape, offset = uneven.shape, (offset[0] + uneven.centroid[0], offset[1] + uneven.centroid[1])
-    # Euler-Bernoulli beams (B33) apart from the others, and those that a node of their own orients; groups are the same
-    # whichever program reads the deck
+    # Euler-Bernoulli beams (B33) are separate from the others, and so are beams with an orientation node; the groups do
+    # not depend on the program for which the deck is read
     is_slender = np.isin(kept, np.concatenate(slender)) if slender else np.zeros(len(kept), dtype=bool)
     parts: dict[tuple[bool, tuple[float, float, float]], list[int]] = {}
     for element, has_no_shear in zip(kept.tolist(), is_slender.tolist(), strict=True):
@@ -212,10 +212,11 @@ def _is_uneven(kind: str, walls: tuple[float, ...]) -> bool:
 
 
 def ellipses_in_numbers(draft: Draft) -> None:
-    """Give ellipses their area, moments, torsion constant and Cowper's (1966) shear areas.
+    """Set area, second moments, torsion constant and Cowper's (1966) shear areas of ellipses.
 
-    With half axes a, along the force, and b: kappa = 12 (1 + nu) a² (3 a² + b²) / ((40 + 37 nu) a⁴ +
-    (16 + 10 nu) a² b² + nu b⁴), that of the circle for a = b, and 9/10 for b -> 0 as by the energy of the shear flow.
+    The half axis a is along the force, b normal to it: kappa = 12 (1 + nu) a² (3 a² + b²) / ((40 + 37 nu) a⁴ +
+    (16 + 10 nu) a² b² + nu b⁴). For a = b, this is the value of the circle; for b -> 0 and nu = 0 it is 9/10, as from
+    the energy of the shear flow.
     """
     for k, line in enumerate(draft.lines):
         if line.shape["shape"] != "ellipse":
@@ -323,8 +324,8 @@ def _to_ground(block: DeckBlock, draft: Draft, of_set: PointElements) -> None:
 def _component_springs(here: str, block: DeckBlock, draft: Draft, of_set: PointElements) -> None:
     """Read springs between equal components of two nodes, if their forces are in balance.
 
-    Two forces along an axis balance on one line only: the nodes are at one place, or apart along this axis. Two moments
-    always do.
+    Two opposite forces along an axis are in balance only if both nodes are on one line along this axis. Two opposite
+    moments always are.
     """
     first, second = (int(number) for number in (numbers(block.lines[0]) * 2)[:2])
     value = numbers(block.lines[1])[0]

@@ -34,8 +34,9 @@ def read_nodal_thickness(here: str, block: DeckBlock, draft: Draft) -> None:
 def sections_by_thickness(draft: Draft) -> None:
     """Replace each shell section with nodal thicknesses by one section for each mean thickness.
 
-    (1) mean of an element: the integral of the thickness that its shape functions carry, by its area
-    (2) nodes without a thickness of their own have that of the section
+    (1) the mean of an element is the integral of the thickness that its shape functions interpolate, divided by its
+        area
+    (2) nodes without a thickness have that of the section
     """
     if not draft.nodal_thickness:
         if draft.nodal_shells:

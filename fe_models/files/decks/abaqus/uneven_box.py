@@ -1,11 +1,11 @@
 """Boxes with different walls, converted to general sections.
 
-Walls 1 to 4 stand at +y, +z, -y, -z. Area and second moments are those of the outer rectangle less the hole. Shear and
-torsion are those of the thin-walled cell along the middle line: for a force V along c (y or z), I = ∮ c² t ds,
+Walls 1 to 4 are at +y, +z, -y, -z. Area and second moments are those of the outer rectangle minus the hole. Shear and
+torsion are those of the thin-walled cell along the middle line. For a force V along c (y or z) and I = ∮ c² t ds,
 
     q(s) = q_0 - V/I ∫ c t ds,  ∮ q/t ds = 0,  A_s = V² / ∮ q²/t ds,
 
-the moment of q about the centroid over V gives the shear centre, J = 4 A_m² / ∮ ds/t + ∮ t³ ds / 3 (Bredt).
+The moment of q about the centroid, divided by V, gives the shear centre. J = 4 A_m² / ∮ ds/t + ∮ t³ ds / 3 (Bredt).
 """
 
 from dataclasses import dataclass
@@ -83,7 +83,7 @@ def _line_centroid(corners: Array, t: Array) -> Array:
 
 
 def _shear(corners: Array, t: Array, c: int) -> tuple[float, float]:
-    """Return shear area along component c, and the moment about x of the flow of a unit force, about the centroid."""
+    """Return the shear area along component c, and the moment about the centroid of the shear flow of a unit force."""
     xi, w = np.polynomial.legendre.leggauss(3)  # exact for q², of degree 4
     xi, w = (xi + 1) / 2, w / 2
     X = corners - _line_centroid(corners, t)

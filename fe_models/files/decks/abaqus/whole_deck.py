@@ -186,9 +186,9 @@ _NONLINEAR = {
     "NONSTRUCTURAL MASS": "mass that is not at nodes",
     "FLUID SECTION": "fluid elements",
 }  #: reason why each keyword cannot be converted: it has mass, stiffness or constraints
-#: keyword without blanks, which CalculiX lets one leave out -> keyword
+#: keyword without blanks, which can be left out in CalculiX -> keyword
 _SQUEEZED = {name.replace(" ", ""): name for name in (*PARAMETERS, *HARMLESS, *_NONLINEAR)}
-SAME_PLANE = 1e-9  #: differences in z of plane elements, over the size of the deck, up to which they are in one plane
+SAME_PLANE = 1e-9  #: differences in z of plane elements divided by the size of the deck, up to which they are rounding
 _FIRST = ("ELEMENT", "TRANSFORM", "SURFACE")  #: keywords that are read before the others, which may precede them
 _SILENT = ("STEP", "END STEP", "ENDSTEP", "NO ANALYSIS")
 
@@ -201,12 +201,12 @@ def read_abaqus_deck(path: Path, data: bytes, *, program: str = "calculix") -> D
     path, data
         File name and content.
     program
-        "calculix" or "abaqus": whose elements these are, which integrate stiffness and mass by other points.
+        "calculix" or "abaqus", the program whose elements these are; their rules for stiffness and mass differ.
 
     Raises
     ------
     MeshError
-        If the deck is damaged. What cannot be taken over is in the ledger.
+        If the deck is damaged. Content that cannot be converted is in the ledger.
     """
     where = f"deck {path}"
     if program not in PROGRAMS:

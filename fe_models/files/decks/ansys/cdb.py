@@ -32,7 +32,7 @@ MESH_ONLY = 200  #: number of the ANSYS element type that is only a mesh
 SHELLS = {181: (4, "quad"), 281: (8, "quad8")}
 _DOFS = {"UX": 0, "UY": 1, "UZ": 2, "ROTX": 3, "ROTY": 4, "ROTZ": 5}
 _FORCES = {"FX": 0, "FY": 1, "FZ": 2, "MX": 3, "MY": 4, "MZ": 5}
-#: element -> number of KEYOPT -> its values, and the integration that each means; "": as without it
+#: element -> number of KEYOPT -> its values, and the integration that each selects; "": the default
 KEYOPTS: dict[int, dict[int, dict[int, str]]] = {
     185: {2: {0: "", 2: "", 3: ""}},
     186: {2: {0: "reduced", 1: "full"}},
@@ -81,7 +81,7 @@ def read_cdb_deck(path: Path, data: bytes) -> Deck:
     Raises
     ------
     MeshError
-        If the file is damaged. What cannot be taken over is in the ledger.
+        If the file is damaged. Content that cannot be converted is in the ledger.
     """
     where = f"deck {path}"
     draft = _Draft(where, Ledger(where))
@@ -315,8 +315,8 @@ def _deck(path: Path, draft: _Draft) -> Deck:
 def _shell(draft: _Draft, kind: int, row: list[int]) -> tuple[str, ShellSection, list[int]] | None:
     """Return cell, section and nodes of a shell element; None if it cannot be converted.
 
-    The nodes lie on the middle surface, or on the top or bottom one (SECOFFSET). Layers of isotropic materials are read
-    as they are; directions of orthotropic ones would follow the axes of the element.
+    The nodes lie on the middle, top or bottom surface (SECOFFSET). Only layers of isotropic materials are read: the
+    directions of orthotropic layers would follow the axes of the element.
     """
     layers = draft.layers.get(row[3])
     offset = draft.offsets.get(row[3], "MID")
@@ -363,8 +363,8 @@ def _integration(draft: _Draft, number: int, kind: int) -> str:
 def _material(draft: _Draft, number: int, tables: dict[str, dict[int, float]], is_used: bool) -> DeckMaterial:
     """Return a material at the first temperature of its tables.
 
-    ANSYS takes EY, EZ = EX, PRXY = 0.3, PRXZ, PRYZ = PRXY and G = E/(2 (1 + nu)) where they are not given; PR are the
-    major ratios, nu_xy/E_x = nu_yx/E_y, and NU the minor ones, PR_xy = NU_xy E_x/E_y.
+    The defaults of ANSYS are EY = EZ = EX, PRXY = 0.3, PRXZ = PRYZ = PRXY and G = E/(2 (1 + nu)). PR are the major
+    Poisson's ratios, with nu_xy/E_x = nu_yx/E_y, and NU the minor ones: PR_xy = NU_xy E_x/E_y.
     """
     labels = {label: table[min(table)] for label, table in tables.items() if table}
     for label, table in tables.items() if is_used else ():

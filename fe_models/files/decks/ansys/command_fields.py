@@ -1,8 +1,8 @@
 """The commands of ANSYS in a .cdb file, and which of their fields are read.
 
-`COMMANDS` lists every command that is read, field by field, in the symbols of `fe_models.files.decks.field_table`;
-`COLUMNS` the columns of an element in EBLOCK. Commands that say nothing about the body stand on `HARMLESS`; others are
-refused by name.
+`COMMANDS` lists every command that is read, field by field, in the symbols of `fe_models.files.decks.field_table`.
+`COLUMNS` lists the columns of an element in EBLOCK. `HARMLESS` lists commands without effect on the body. All other
+commands are refused by name.
 """
 
 from fe_models.files.decks.field_table import TableField, has_default, parse_fields
@@ -26,7 +26,7 @@ COMMANDS = {
     "MDAMP": "STLOC~ V1^ V2^ V3^ V4^ V5^ V6^",
 }  # fmt: skip
 COLUMNS = "MAT TYPE REAL~ SECNUM ESYS DEATH=0 SOLID~ SHAPE~ COUNT EXCLUDE~ NUMBER"
-#: commands that say nothing about the body: structure of the file, loads and controls of an analysis
+#: commands without effect on the body: structure of the file, loads and controls of an analysis
 HARMLESS = frozenset(
     "ACEL ACELL ANTYPE AUTOTS BF BFE BFBLOCK BFEBLOCK BFUNIF CGLOC CGOMEGA CGOMGA CLOCAL CLWRITE CM CMDELE CMGRP "
     "CMOMEGA CMSEL CNVTOL CRPLIM CS CSCIR CSDELE CSYS DCGOMG DELTIM DOF DOMEGA DSYS EPLOT EQSLV ERESX ERNORM ESEL "

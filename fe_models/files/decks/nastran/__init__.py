@@ -1,4 +1,4 @@
-"""Whole decks of Nastran: one module for each kind of card, all writing one model.
+"""Whole decks of Nastran: one module for each kind of card; all add to one model.
 
 `whole_deck` reads a deck and makes the cells of solids, shells and bars; `card_fields` lists all cards. Cells get their
 properties and materials in `sections` (solids, shells, bars), `layups` (PCOMP), `tapers` (PBEAM) and `bars`

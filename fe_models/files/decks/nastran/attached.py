@@ -20,7 +20,7 @@ from fe_models.meshes.cell_shapes import CELL_SHAPES
 
 __all__ = ["read_attached"]
 
-SAME = 1e-9  #: difference of entries of a mass matrix over the largest one, up to which they are equal
+SAME = 1e-9  #: difference of entries of a mass matrix divided by the largest one, up to which they are equal
 
 #: kind of cell and number of corner grids of each solid card
 _FACED = {"CTETRA": ("tetra", 4), "CPENTA": ("wedge", 6), "CHEXA": ("hexahedron", 8)}
@@ -65,9 +65,9 @@ def _mass(model: NastranModel, card: Card) -> None:
 
 
 def _mass_matrix(model: NastranModel, card: Card) -> None:
-    """Read CONM1: the mass matrix of a rigid piece in the axes of CID; other matrices go to the ledger.
+    """Read CONM1: the mass matrix of a rigid body in the axes of CID; other matrices are added to the ledger.
 
-    With v_c = v + omega × r, the piece has M_tt = m, M_rt = m [r]×, M_rr = J - m [r]× [r]×.
+    With v_c = v + omega × r, it has M_tt = m, M_rt = m [r]×, M_rr = J - m [r]× [r]×.
     """
     node = card.integer(2)
     axes = model.system(card, card.integer(3, 0), model.point(card, node))
@@ -89,9 +89,10 @@ def _mass_matrix(model: NastranModel, card: Card) -> None:
 
 
 def _scalar_masses(model: NastranModel) -> None:
-    """Read CMASS1 and CMASS2 at one grid point: equal masses along all axes form a point mass, others go to the ledger.
+    """Read CMASS1 and CMASS2 at one grid point; equal masses along all axes form a point mass.
 
-    Axes along which the deck holds the point do not count: no mass moves there.
+    Axes along which the deck fixes the point are not compared, because no mass moves along them. Other masses are added
+    to the ledger.
     """
     along: dict[int, list[float]] = {}
     cards: dict[int, list[Card]] = {}
@@ -227,7 +228,7 @@ def _mean(model: NastranModel, card: Card) -> None:
 def _mean_rows(
     model: NastranModel, card: Card, node: int, components: tuple[int, ...], weights: dict[int, Array]
 ) -> list[tuple[tuple[int, int], Row]]:
-    """Return an equation for each component of a mean motion, with weights and components along nodal axes.
+    """Return an equation for each component of a mean motion; weights and components are along nodal axes.
 
     e · u = Σ A_i u_i, where e is the axis of the component and A that of `weighted_motion`.
     """

@@ -1,7 +1,7 @@
 """Cross-sections of Nastran bars and beams: PBAR, PBARL, PBEAM, PBEAML.
 
-Element axes of Nastran: y lies in plane 1, z completes it. I1 = ∫ y² bends in plane 1, I2 = ∫ z² in plane 2, and
-I12 = ∫ y z.
+Element axes of Nastran: y lies in plane 1, z is normal to x and y. I1 = ∫ y² belongs to bending in plane 1, I2 = ∫ z²
+to bending in plane 2, and I12 = ∫ y z.
 """
 
 from collections.abc import Callable
@@ -46,8 +46,8 @@ def _general(
 ) -> tuple[dict[str, Any], float] | str:
     """Return the keys in principal axes, and their angle. A shear factor of 0 means no shear deformation.
 
-    N: the centroid from the shear centre, along the element's y and z.
-    With tan 2a = 2 I12/(I1 - I2), I_a = (I1 + I2)/2 + hypot((I1 - I2)/2, I12) is the largest second moment, of y².
+    N is the position of the centroid relative to the shear centre, along y and z of the element. With
+    tan 2a = 2 I12/(I1 - I2), I_a = (I1 + I2)/2 + hypot((I1 - I2)/2, I12) is the largest second moment.
     """
     if not (A > 0 and I1 > 0 and I2 > 0 and I1 * I2 > I12**2):
         return f"A, I1, I2 and I1 I2 - I12² must be above zero, got A = {A:g}, I1 = {I1:g}, I2 = {I2:g}, I12 = {I12:g}"
@@ -79,8 +79,8 @@ def _pbeam(model: NastranModel, card: Card) -> BarShape | str:
     """Read a PBEAM with one section along its length; `cut_tapers` has removed its stations.
 
     (1) A, I1, I2, I12, J, NSM; four stress points
-    (2) K1, K2 (default 1), shear relief, inertia of the added mass, warping; its offset; offset N1, N2 of the centroid
-        from the line of the ends, which is that of the shear centres
+    (2) K1, K2 (default 1), shear relief, inertia of the added mass, warping; offset of the added mass; offset N1, N2 of
+        the centroid from the line of the ends, on which the shear centres lie
     """
     A, I1, I2, I12, J = (card.real(k, 0.0) for k in (3, 4, 5, 6, 7))
     at = 17
@@ -139,8 +139,9 @@ def _from_rectangles(
 ) -> tuple[float, float, float, float, float] | None:
     """Return A, I1, I2, I12, J of rectangles that do not overlap.
 
-    cells: of closed walls, by their middle lines, the areas A_k that they enclose and F, of which F_kk = ∮ ds/t of a
-    cell and F_kl = -∫ ds/t of the wall between two. Bredt's flows q = 2 F⁻¹ A give J = 2 A · q. None: an open section.
+    `cells` contains, for closed walls, the areas A_k that their middle lines enclose, and the matrix F: F_kk = ∮ ds/t
+    of a cell, F_kl = -∫ ds/t of the wall between two cells. Bredt's flows q = 2 F⁻¹ A give J = 2 A · q. For an open
+    section, `cells` is None.
     """
     if any(b <= 0 or h <= 0 for b, h, _, _ in parts):
         return None
@@ -159,7 +160,7 @@ def _from_rectangles(
 
 
 def _hexagon(d1: float, d2: float, d3: float) -> tuple[float, float, float, float, float] | None:
-    """HEXA: width d2 from tip to tip, height d3, tips d1 deep; J as Saint-Venant's A⁴/(4 pi² I_p)."""
+    """Return HEXA: width d2 from tip to tip, height d3, tips d1 deep; J = A⁴/(4 pi² I_p) by Saint-Venant."""
     flat = d2 - 2 * d1
     if flat < 0:
         return None
@@ -224,7 +225,7 @@ def _hat1(b: float, h: float, top: float, t: float, t_plate: float) -> tuple[lis
 def _channel_centre(b: float, h: float, t_w: float, t_f: float) -> float:
     """Return the distance of the centroid of a channel from its shear centre, towards its flanges.
 
-    By the middle lines, b and h long: the shear centre lies 3 b² t_f/(6 b t_f + h t_w) behind the web.
+    With the lengths b and h of the middle lines, the shear centre lies 3 b² t_f/(6 b t_f + h t_w) behind the web.
     """
     b, h_w, h = b - t_w / 2, h - 2 * t_f, h - t_f
     width = b - t_w / 2  # of a flange beside the web
@@ -241,7 +242,7 @@ def _tee_centre(b: float, h: float, t_f: float, t_w: float) -> float:
 def _i_centre(h: float, b1: float, b2: float, t_w: float, t1: float, t2: float) -> float:
     """Return the distance of the centroid of an I above its shear centre.
 
-    The flanges, of second moments I_1 (below) and I_2, take the shear force in their ratio.
+    The flanges share the shear force in proportion to their second moments I_1 (below) and I_2.
     """
     web, between = h - t1 - t2, h - (t1 + t2) / 2
     centroid = (web * t_w * (web + t1) / 2 + between * t2 * b2) / (web * t_w + t1 * b1 + t2 * b2)
@@ -313,4 +314,4 @@ SHEAR_CENTRES: dict[str, Callable[..., tuple[float, float]]] = {
     "CHAN2": lambda t, bottom, h, b: (_channel_centre(h, b, bottom, t), 0.0),
     "L": _angle_centre,
 }
-"""Shape -> its centroid from its shear centre along y and z, by thin walls: PBEAML has its ends at the shear centre"""
+"""Shape -> position of the centroid relative to the shear centre along y and z, for thin walls (ends of PBEAML)"""

@@ -19,7 +19,7 @@ __all__ = ["BARS", "OFFSETS", "line_of_ends", "orientation_of", "read_bars", "wi
 BARS = ("CBAR", "CBEAM")
 ORIENTATION, OFFT = (5, 6, 7), 8
 OFFSETS = ((11, 12, 13), (14, 15, 16))  #: field numbers of the offsets of ends A and B
-SAME = 1e-9  #: difference of offsets over the bar length, up to which they are equal
+SAME = 1e-9  #: difference of offsets divided by the bar length, up to which they are equal
 
 
 def with_defaults(model: NastranModel) -> None:
@@ -47,12 +47,12 @@ def _filled(card: Card, default: Card) -> Card:
 def read_bars(model: NastranModel, known: Card, cards: list[Card]) -> None:
     """Read the bars of one property, with a group for each orientation and offset.
 
-    (1) axes of the element: x from GA to GB, y towards the orientation vector in plane 1, z
-    (2) an offset that is the same at both ends and across the bar belongs to the section; any other one makes a node
-        at its end, which moves rigidly with the grid point
-    (3) a released end gets a node at its end too; all motions but the released ones are those of the grid point
+    (1) axes of the element: x from GA to GB, y in plane 1 towards the orientation vector, z normal to both
+    (2) an offset that is equal at both ends and normal to the bar belongs to the section; for any other offset a node
+        is added at the end, which moves rigidly with the grid point
+    (3) a node is also added at a released end; all its motions except the released ones are those of the grid point
     (4) J = 0 releases the rotation about the axis at the end with fewer bars and shells, so that the inertia of torsion
-        stays with the rest; a planar body never twists its bars
+        stays with the other bars; in a planar body, bars are never twisted
     """
     pid = known.text(1)
     shape = bar_shape(model, known)
@@ -123,10 +123,10 @@ def _uses(model: NastranModel) -> Counter[int]:
 
 
 def _with_own_shear(model: NastranModel, name: str, keys: dict[str, Any]) -> tuple[str, dict[str, Any]] | str:
-    """Return material and section of bars, changed if their MAT1 gives a G of its own; a text tells why G is refused.
+    """Return material and section of bars, changed if their MAT1 gives its own G; or a text why G is refused.
 
-    G scales the torsion constant and the shear areas of a general section; other shapes get a material with
-    nu = E/(2 G) - 1, since bars have no other use for nu.
+    In a general section, G scales the torsion constant and the shear areas. Other shapes get a material with
+    nu = E/(2 G) - 1, because bars do not use nu otherwise.
     """
     factor = model.shear_factor(name)
     if factor == 1.0:
@@ -186,8 +186,8 @@ def _orientation(model: NastranModel, card: Card, grid: Array, start: Array) -> 
 def _offsets(model: NastranModel, card: Card, ends: Array) -> Array:
     """Return the offsets of both ends from their grid points, (2, 3), basic axes.
 
-    OFFT says for each end whether its offset is along displacement axes (G, the default) or along axes of the element
-    (O), which are those of the bar between its grid points.
+    OFFT determines for each end whether its offset is along displacement axes (G, the default) or along the axes of the
+    element (O), computed without offsets from its grid points.
     """
     W = np.array([[card.real(k, 0.0) for k in fields] for fields in OFFSETS])
     if not np.any(W):
@@ -210,8 +210,8 @@ def _offsets(model: NastranModel, card: Card, ends: Array) -> Array:
 def _own_ends(model: NastranModel, card: Card, W: Array, R: Array, released: list[tuple[int, ...]]) -> None:
     """Steps (2) and (3) of `read_bars`: add nodes to a bar whose end has an offset or released motions.
 
-    A released motion is one along or about an axis of the element. The kept ones of its three say E d = 0 with E the
-    rows of their axes and d the motion of the end against that of its place on the grid point, u + theta × W.
+    A released motion is along or about an axis of the element. The other translations or rotations give E d = 0. The
+    rows of E are their axes; d is the motion of the end minus the motion u + theta × W of its place at the grid point.
     """
     for end in (0, 1):
         if not np.any(W[end]) and not released[end]:

@@ -41,15 +41,16 @@ class _Bend:
 
 
 def read_bends(model: NastranModel) -> None:
-    """Convert each CBEND to two springs between its grid points, and two rigid pieces with mass.
+    """Convert each CBEND to two springs between its grid points, and two rigid bodies with mass.
 
-    (1) the circle through the grid points, by GEOM
-    (2) the line of centroids lies RC outside of it and ZC along z; x points outward and z is across the arc, so that
-        y = z × x runs from GA to GB
-    (3) its flexibility, integrated along the arc (`_flexibility`)
-    (4) The arc is symmetric about x. In the plane the point p = -c_ym/c_mm on x is the elastic centre, across it
-        p = c_zm/c_mm; the flexibility of each is diagonal there, so each is one spring with rigid arms.
-    (5) each half of the arc is a rigid piece of its end
+    (1) The circle through the grid points is determined as GEOM requires.
+    (2) The line of centroids is shifted from it by RC outward and by ZC along z. x points outward, z is normal to the
+        plane of the arc, and y = z × x points from GA to GB.
+    (3) The flexibility is integrated along the arc (`_flexibility`).
+    (4) The arc is symmetric about x. The elastic centre for motion in the plane is the point p = -c_ym/c_mm on x, and
+        for motion out of the plane p = c_zm/c_mm. Both flexibilities are diagonal there, so that each is represented by
+        one spring with rigid arms.
+    (5) The mass of each half of the arc is a rigid body attached to its end.
     """
     for card in model.of("CBEND"):
         why = _curved_beam(model, card)
@@ -100,11 +101,11 @@ def _vector(x: Array) -> Vector:
 def _arc(model: NastranModel, card: Card, known: Card, RC: float) -> _Arc | str:
     """Return the circle of a CBEND, or a text with the reason if there is none.
 
-    With the chord d from GA to GB and the vector v from GA:
-    GEOM = 1: the centre lies on the line of v, at equal distances: t v with t = d²/(2 v · d)
-    GEOM = 2: v is the tangent at GA, and the arc lies on the side of v: half of the angle is that from v to d
-    GEOM = 3: the radius of the line of centroids is RB; the centre lies on the other side of the chord than v
-    GEOM = 4: the angle is THETAB; the centre lies on the other side of the chord than v
+    d is the chord from GA to GB, v the vector from GA.
+    GEOM = 1: v points to the centre, which is equally far from both ends: it is at t v with t = d²/(2 v · d)
+    GEOM = 2: v is the tangent at GA, and the arc is on the side of v; the angle from v to d is half of the arc's angle
+    GEOM = 3: the radius of the line of centroids is RB; v and the centre are on different sides of the chord
+    GEOM = 4: the angle is THETAB; v and the centre are on different sides of the chord
     """
     a, b = (model.point(card, card.integer(k)) for k in (3, 4))
     word, kind = card.text(5), card.text(8)
@@ -148,8 +149,8 @@ def _arc(model: NastranModel, card: Card, known: Card, RC: float) -> _Arc | str:
 def _section(known: Card, R: float, nu: float) -> _Bend | str:
     """Return the section of a PBEND, or a text with the reason if it cannot be converted.
 
-    An integer in the field of A is FSI: a pipe of mean radius RM and thickness T, a solid circle of RM without T. Its
-    flexibility factor is 1 for FSI = 1.
+    An integer in the field of A is FSI: the section is a pipe with mean radius RM and thickness T, or a solid circle
+    with radius RM if T is missing. For FSI = 1 the flexibility factor is 1.
     """
     if known.text(3).lstrip("+").isdigit():
         return _pipe(known, R, nu)
@@ -167,7 +168,7 @@ def _section(known: Card, R: float, nu: float) -> _Bend | str:
 
 
 def _pipe(known: Card, R: float, nu: float) -> _Bend | str:
-    """Return a pipe; its neutral axis is that of Winkler's theory, R - A/∫ dA/r, with ∫ dA/r by both radii."""
+    """Return a pipe; its neutral axis is at R - A/∫ dA/r (Winkler's theory), with ∫ dA/r from both of its radii."""
     if known.integer(3) != 1:
         return f"FSI = {known.text(3)}: flexibility factors of pipes that flatten; only FSI = 1"
     RM, T = known.real(4), known.real(5, 0.0)
@@ -180,12 +181,13 @@ def _pipe(known: Card, R: float, nu: float) -> _Bend | str:
 
 
 def _flexibility(section: _Bend, E: float, G: float, R: float, angle: float) -> Array:
-    """Return the (6, 6) flexibility: relative motion of the ends per force and moment, both at the middle of the arc.
+    """Return the (6, 6) flexibility: relative motion of the ends due to force and moment, at the middle of the arc.
 
-    (1) A section at the angle phi has r and t, outward and along the arc. From forces F and moments M at the middle it
-        has N = t · F, V = r · F, V2 = z · F, and T, M2, M1 = (t, r, z) · (M - s × F), s its place.
-    (2) N and M1 act at the neutral axis, of radius R_n = R - offset, where they are not coupled: the energy of a piece
-        is (N² R_n/(E A) + M1² R/(E I1)) dphi/2. All others act at the centroid and have R dphi.
+    (1) At the angle phi, the directions r and t point outward and along the arc, and s is the position of the section.
+        Force F and moment M at the middle cause N = t · F, V = r · F, V2 = z · F and
+        T, M2, M1 = (t, r, z) · (M - s × F) in this section.
+    (2) N and M1 act at the neutral axis of radius R_n = R - offset, where they are not coupled: their energy is
+        (N² R_n/(E A) + M1² R/(E I1)) dphi/2. All others act at the centroid, on a length of R dphi.
     """
     x, weights = np.polynomial.legendre.leggauss(N_POINTS)
     C = np.zeros((6, 6))
@@ -210,10 +212,10 @@ def _flexibility(section: _Bend, E: float, G: float, R: float, angle: float) -> 
 def _half(
     model: NastranModel, card: Card, arc: _Arc, middle: Array, R: float, side: int, added: float, node: str
 ) -> DeckMass:
-    """Return half of the centroid line as a rigid piece at end A (side -1) or B (1).
+    """Return half of the line of centroids as a rigid body at end A (side -1) or B (1).
 
-    A line of radius R and half angle b has its centroid at R sin(b)/b, and about the centre the means of the squares
-    R² (1/2 ± sin(2 b)/(4 b)) along and across its middle direction.
+    The centroid of an arc with radius R and half angle b is at R sin(b)/b. The mean squares of the coordinates along
+    its middle direction and normal to it, from the centre, are R² (1/2 ± sin(2 b)/(4 b)).
     """
     b = arc.angle / 4
     x, y, z = arc.axes

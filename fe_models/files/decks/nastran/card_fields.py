@@ -4,7 +4,7 @@
 `fe_models.files.decks.field_table`.
 
 `HARMLESS` lists the cards that belong to an analysis: loads, modes, aerodynamics, optimisation, output. A card in
-neither is refused by name: it may carry mass or stiffness.
+neither list is refused by name, because it may have mass or stiffness.
 """
 
 from fe_models.files.bulk_data.cards import real_of
@@ -85,7 +85,7 @@ HARMLESS = frozenset(
     "PLOADX1 PLOTEL PLOTEL3 PLOTEL4 RANDPS RANDT1 RFORCE RLOAD1 RLOAD2 SLOAD SPCD SPCR TLOAD1 TLOAD2 TABLED1 TABLED2 "
     "TABLED3 TABLED4 TABRND1 TABRNDG TEMP TEMPB3 TEMPBC TEMPD TEMPF TEMPP1 TEMPP2 TEMPP3 TEMPRB DEFORM DTEMP "
     "DEFUSET USET USET1 CLOAD QHBDY QVECT QVOL QBDY1 QBDY2 QBDY3 "
-    # tables that only other cards name, modal damping (named in the ledger)
+    # tables that are only referred to by other cards, and modal damping (named in the ledger)
     "TABLES1 TABLEST TABLEH1 TABLEHT TABLEM1 TABLEM2 TABLEM3 TABLEM4 TABDMP1 TABLE3D "
     # sets of dofs of an analysis
     "CSET CSET1 OMIT OMIT1 QSET QSET1 SESET SEQSET SEQSET1 SPOINT EPOINT SEELT SECSET SEBSET "
@@ -104,16 +104,16 @@ HARMLESS = frozenset(
     # rotors and cyclic results, acoustics and heat of an analysis
     "CAMPBLL CHACAB ROTORD ROTORG ROTORSE UNBALNC RSPINR RSPINT RGYRO CREEP CONV CONVM PCONV PCONVM RADBC RADM RADMT "
     "RADSET PHBDY CHBDYE CHBDYG CHBDYP MAT4 MAT5 "
-    # regions of contact, which connect nothing by themselves (BGSET, BCTABLE, BCTSET do)
+    # contact regions, which do not connect anything themselves (BGSET, BCTABLE, BCTSET do)
     "BSURF BSURFS BSURF0 BCPROP BCPROPS BLSEG BCPARA BCTPARM BGPARM BCRPARA BCONP BFRIC BCBODY BCBODY1".split()
 )  # fmt: skip
-#: properties and materials that no element read here can name: elements that do are refused by their own name
+#: properties and materials that no supported element refers to; the elements that do are refused by name
 UNNAMED = frozenset(
     "MAT3 MAT9 MAT10 MAT11 MATF MATG MATHE MATORT MATEP PACABS PACBAR PAABSF PAXISYM PBCOMP PBEAM3 "
     "PBUSH2D PCOHE PCONEAX PFAST PSEAM PSHEAR PRAC2D PRAC3D PWELD PSHLN1 PSHLN2 "
     "PSLDN1".split()
 )
-#: cards that change another card in nonlinear analyses, or over frequency: that card is taken as it stands
+#: cards that change another card in nonlinear analyses, or with frequency; that card is used unchanged
 NOMINAL = {
     "MATS1": "nonlinear material: the elastic constants of its MAT1 are taken",
     "PELAST": "the constant stiffness of its PELAS is taken",
@@ -132,7 +132,7 @@ def check_cards(model: NastranModel) -> None:
     """Add all cards and fields that are not converted to the ledger.
 
     (1) a card that is neither read nor harmless is refused by name
-    (2) a field of a card that is read is refused where it has another value than its default
+    (2) an unsupported field of a card that is read is refused if its value is not the default
     (3) structural damping is left out and named
     """
     for name, cards in model.cards.items():

@@ -32,7 +32,7 @@ DIGITS = 6  #: digits to which directions must agree
 def sheet_material(model: NastranModel, card: Card) -> None:
     """Read MAT8: E1, E2, NU12, G12, G1Z, G2Z, RHO; constants that a sheet does not have are assumed.
 
-    E_3 = E_2 and nu_13 = nu_23 = 0 have no part in shells.
+    E_3 = E_2 and nu_13 = nu_23 = 0 have no effect in shells.
     """
     E_1, E_2, nu, G = (card.real(k) for k in (2, 3, 4, 5))
     across = [card.real(k, 0.0) for k in (6, 7)]
@@ -71,8 +71,8 @@ def layers_of_card(card: Card) -> tuple[DeckLayer, ...] | str:
 def layered_shells(model: NastranModel, known: Card, cards: list[Card], offset_field: dict[str, int]) -> None:
     """Convert shells of one PCOMP: a section for each offset and layup direction.
 
-    The direction is the side from G1 to G2 turned by THETA about the normal, or axis x of the system MCID. Z0 is the
-    bottom of the layers from the grid points; ZOFFS moves them up.
+    The direction is the side from G1 to G2 rotated by THETA about the normal, or axis x of the system MCID. Z0 is the
+    height of the bottom of the layers above the grid points; ZOFFS is added to it.
     """
     pid = known.text(1)
     layers = layers_of_card(known)
@@ -87,7 +87,7 @@ def layered_shells(model: NastranModel, known: Card, cards: list[Card], offset_f
 
 
 def _layer_material(model: NastranModel, name: str) -> str:
-    """Return the material of a layer; a MAT1 with a G of its own becomes a sheet that has it across the plane."""
+    """Return the material of a layer; a MAT1 with its own G becomes a sheet material with this transverse modulus."""
     if name not in model.shear_moduli:
         return name
     material, G, made = model.materials[name], model.shear_moduli[name], f"{name}_sheet"
@@ -110,7 +110,7 @@ def orthotropic_shells(
 def plane_strain_shells(model: NastranModel, known: Card, cards: list[Card], offset_field: dict[str, int]) -> None:
     """Convert membranes of PLPLANE, or of PSHELL with MID2 = -1, to a planar body in plane strain.
 
-    The body is a slice of thickness T, 1 where it is blank; for its material see `DeckMaterial.in_plane_strain`.
+    The body is a slice of thickness T (1 if blank); for its material see `DeckMaterial.in_plane_strain`.
     """
     pid, is_plplane = known.text(1), known.name == "PLPLANE"
     name = known.text(2)
@@ -165,7 +165,8 @@ def stiffness_shells(model: NastranModel, known: Card, cards: list[Card], offset
     """Convert shells of a PSHELL with separate materials for membrane, bending, shear and coupling.
 
     (1) A = T G1, D = I G2 with I = (12I/T**3) T³/12, and H = TS G3 with TS = (TS/T) T
-    (2) B = -T² G4: Nastran's curvatures have the other sign, G4 = -(1/T²) ∫ G z dz (NASTRAN-95, mis/ta1cpd.f)
+    (2) B = -T² G4, because Nastran's curvatures have the opposite sign: G4 = -(1/T²) ∫ G z dz (NASTRAN-95,
+        mis/ta1cpd.f)
     (3) the mass is that of MID1, T RHO + NSM
     """
     pid, T = known.text(1), known.real(3)

@@ -29,7 +29,7 @@ from fe_models.foundation.arrays import Array
 __all__ = ["ALL", "ALONG", "PROPERTIES", "NastranModel"]
 
 ALL = (0, 1, 2, 3, 4, 5)
-ALONG = 1e-9  #: component of a vector normal to a line over its length, below which it is along the line
+ALONG = 1e-9  #: component of a vector normal to a line divided by its length, below which it is along the line
 #: properties of solids, shells, bars and beams, which share one range of numbers
 PROPERTIES = ("PSOLID", "PLSOLID", "PSHELL", "PLPLANE", "PCOMP", "PCOMPG", "PBAR", "PBARL", "PBEAM", "PBEAML")
 
@@ -49,7 +49,7 @@ class NastranModel:
     wtmass: float = 1.0  #: value of PARAM,WTMASS, by which all masses are multiplied
     is_lumped: bool = True  #: whether masses are lumped, which PARAM,COUPMASS changes
     materials: dict[str, DeckMaterial] = field(default_factory=dict)
-    #: isotropic material -> G of its card, where it is not E/(2 (1 + nu))
+    #: isotropic material -> G of its card, if it is not E/(2 (1 + nu))
     shear_moduli: dict[str, float] = field(default_factory=dict)
     solids: list[SolidSection] = field(default_factory=list)
     shells: list[ShellSection] = field(default_factory=list)
@@ -132,7 +132,7 @@ class NastranModel:
         return self.shear_moduli.get(name, material.young / (2 * (1 + material.poisson)))
 
     def shear_factor(self, name: str) -> float:
-        """Return G on the card of an isotropic material over E/(2 (1 + nu)); 1 if the card has no other G."""
+        """Return G on the card of an isotropic material divided by E/(2 (1 + nu)); 1 if the card has no other G."""
         material = self.materials.get(name)
         if name not in self.shear_moduli or material is None:
             return 1.0

@@ -19,13 +19,13 @@ N_POINTS = 20  #: number of Gauss points along each side; the integrand is a rat
 def read_panels(model: NastranModel) -> None:
     """Convert each CSHEAR.
 
-    (1) One state of stress, a shear flow along the edges, has the energy U and the forces f at the corners
-        (`shear_flow`). The stiffness is that of this state, K = f fᵀ/(2 U).
-    (2) It is made of two massless points in the middle of the panel. Both have the mean motion of the corners, the
-        second one in addition n · u along x with n = f/|f|, and a spring of |f|²/(2 U) acts between them.
-    (3) An edge has a rod of the area F T S/(L + L'), with S the area of the panel and L, L' the lengths of the edge and
-        the opposite one; of F T²/2 where F is above 1.01.
-    (4) A corner has the mass (rho T + NSM) (S_i + S)/6, with S_i the area of the triangle at the corner, as in
+    (1) The panel has one state of stress, a shear flow along its edges, with the energy U and the forces f at the
+        corners (`shear_flow`). The stiffness is that of this state, K = f fᵀ/(2 U).
+    (2) Two massless points are added in the middle of the panel. Both have the mean motion of the corners. The second
+        one also moves by n · u along x, with n = f/|f|. A spring of stiffness |f|²/(2 U) acts between them.
+    (3) Each edge has a rod with the area F T S/(L + L'), where S is the area of the panel and L, L' are the lengths of
+        this edge and the opposite one. If F is above 1.01, the area is F T²/2.
+    (4) Each corner has the mass (rho T + NSM) (S_i + S)/6, where S_i is the area of the triangle at the corner, as in
         NASTRAN-95, mis/masstq.f.
     """
     cards = model.of("CSHEAR")
@@ -107,16 +107,17 @@ def _area(points: Array) -> float:
 
 
 def shear_flow(corners: Array, nu: float) -> tuple[Array, float]:
-    """Return corner forces of a flat panel in shear flow, (4, 2), and its energy times G T.
+    """Return the corner forces of a flat panel in shear flow, (4, 2), and its energy times G T.
 
-    (1) X = (a + b r + c s)/w, w = 1 + g r + h s, maps the unit square to the panel: lines of equal r or s are straight
-        and meet where opposite edges meet. Its tangents are X_r = (b - g X)/w and X_s = (c - h X)/w; J = det(X_r, X_s).
-    (2) The stress times T is q (X_r ⊗ X_s + X_s ⊗ X_r), free of normal stress on all such lines. It is in equilibrium
-        if J q = w², since X_rs = -(g X_s + h X_r)/w.
+    (1) X = (a + b r + c s)/w, w = 1 + g r + h s, maps the unit square to the panel. Lines of constant r or s are
+        straight and meet where opposite edges meet. The tangents are X_r = (b - g X)/w and X_s = (c - h X)/w;
+        J = det(X_r, X_s).
+    (2) The stress times T is q (X_r ⊗ X_s + X_s ⊗ X_r), without normal stress on all these lines. It is in equilibrium
+        if J q = w², because X_rs = -(g X_s + h X_r)/w.
     (3) U = 1/(2 G T) ∫ w⁴ (J + 2 (X_r · X_s)²/((1 + nu) J)) dr ds
-    (4) An edge of constant s bears the force ∫ w² X_r dr = b w - g (a + b r + c s), which is the same for all r. Half
-        of it acts at each end, as in NASTRAN-95, mis/kpanel.f, of which U and f are those of panels of all shapes,
-        without its tolerance for edges that are nearly parallel.
+    (4) An edge of constant s carries the force ∫ w² X_r dr = b w - g (a + b r + c s), which is the same for all r. Half
+        of it acts at each end. U and f are those of NASTRAN-95, mis/kpanel.f, for panels of all shapes, but without its
+        tolerance for nearly parallel edges.
     """
     a, d_1, d_2 = corners[0], corners[1] - corners[2], corners[3] - corners[2]
     odd = corners[0] - corners[1] + corners[2] - corners[3]
@@ -138,7 +139,7 @@ def shear_flow(corners: Array, nu: float) -> tuple[Array, float]:
 def _strain_spring(
     model: NastranModel, card: Card, grids: list[int], corners: Array, n: Array, stiffness: float
 ) -> None:
-    """Step (2) of `read_panels`: add two points and the spring between them; n: (4, 3)."""
+    """Step (2) of `read_panels`: add two points and the spring between them; n has the shape (4, 3)."""
     middle = corners.mean(axis=0)
     weights = np.tile([1.0, 1.0, 1.0, 0.0, 0.0, 0.0], (4, 1))
     mean = weighted_motion(corners, weights, middle).reshape(6, 4, 6)[:, :, :3]

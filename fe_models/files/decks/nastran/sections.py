@@ -26,7 +26,7 @@ SAME_MODULUS = 1e-6  #: relative difference of G from E/(2 (1 + nu)) up to which
 SOLIDS = ("CTETRA", "CHEXA", "CPENTA", "CPYRAM", "CPYRA")
 SHELLS = ("CTRIA3", "CTRIAR", "CTRIA6", "CQUAD4", "CQUADR", "CQUAD8")
 _OFFSET_FIELD = {"CTRIA3": 7, "CTRIAR": 7, "CTRIA6": 10, "CQUAD4": 8, "CQUADR": 8, "CQUAD8": 16}
-#: card -> corner grids, and of each middle grid, in the order of the card, the corners of its edge
+#: card -> number of corner grids, and the two corners of the edge of each middle grid, in the order of the card
 _MIDDLES: dict[str, tuple[int, tuple[tuple[int, int], ...]]] = {
     "CTETRA": (4, ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))),
     "CPYRAM": (5, ((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4))),
@@ -71,8 +71,8 @@ def read_sections(model: NastranModel) -> None:
 def _material(model: NastranModel, card: Card) -> None:
     """Read MAT1; a blank E, G or NU follows from the other two by E = 2 G (1 + NU).
 
-    Where all three are given and disagree, bars and rods have E and G, shells E and NU in their plane and G across it,
-    and solids E and NU, as in Nastran. Where only E or only G is given, Nastran has zero for the other two.
+    If all three are given and inconsistent, bars and rods use E and G, solids E and NU, and shells E and NU in their
+    plane and G for transverse shear, as in Nastran. If only E or only G is given, the other two are zero in Nastran.
     """
     young, shear, poisson = (card.real(k, 0.0) for k in (2, 3, 4))
     name, given = card.text(1), [bool(card.text(k)) for k in (2, 3, 4)]
@@ -95,7 +95,7 @@ def _material(model: NastranModel, card: Card) -> None:
 def _rubber(model: NastranModel, card: Card) -> None:
     """Read the elastic constants of MATHP for small strain.
 
-    Its energy A10 (I1 - 3) + A01 (I2 - 3) + D1 (J - 1)² + terms of higher order has G = 2 (A10 + A01) and K = 2 D1.
+    The energy A10 (I1 - 3) + A01 (I2 - 3) + D1 (J - 1)² + terms of higher order gives G = 2 (A10 + A01) and K = 2 D1.
     """
     if any(card.text(k) for k in range(49, 57)):
         model.ledger.refuse("MATHP", f"material {card.text(1)}: constants fitted to measured curves (TAB1 to TABD)")
@@ -220,9 +220,9 @@ def _missing_parts(model: NastranModel, known: Card) -> str:
 
 
 def _ratios(model: NastranModel, known: Card) -> tuple[float, float] | str:
-    """Return bending and transverse shear stiffness of a PSHELL over those of a plate of MID1, or the reason.
+    """Return bending and transverse shear stiffness of a PSHELL divided by those of a plate of MID1, or a reason.
 
-    Nastran has E_2 I with I = (12I/T**3) T³/12 for bending and G_3 T_S with T_S = (TS/T) T, 5/6 T where it is blank.
+    In Nastran they are E_2 I with I = (12I/T**3) T³/12, and G_3 T_S with T_S = (TS/T) T, or 5/6 T if TS/T is blank.
     """
     materials = [model.materials.get(known.text(k) or known.text(2)) for k in (2, 4)]
     third = model.materials.get(known.text(6) or known.text(2))

@@ -52,7 +52,7 @@ def springs_to_ground(model: NastranModel) -> None:
 def scalar_ends(model: NastranModel, card: Card) -> list[tuple[int, int] | None] | None:
     """Return (grid point, component) of both ends of a scalar element; None for an end at the ground.
 
-    None in place of the list if a point is scalar.
+    Return None instead of the list if a point is a scalar point.
     """
     ends: list[tuple[int, int] | None] = []
     for k in (3, 5):
@@ -84,7 +84,7 @@ def skip_scalar_points(model: NastranModel) -> None:
 
 
 def _is_between_scalar_points(model: NastranModel, card: Card) -> bool:
-    """Whether both ends of a scalar element are scalar points (component 0 or blank) or ground, and one is a point."""
+    """Return whether a scalar element connects scalar points (component 0 or blank), or one of them and the ground."""
     numbers = [card.integer(k, 0) for k in (3, 5)]
     are_scalar = all((card.text(k) or "0") == "0" for k in (4, 6))
     return any(numbers) and are_scalar and not any(number in model.points.positions for number in numbers)
@@ -161,9 +161,9 @@ def _bush(model: NastranModel, card: Card) -> None:
 
 
 def _bush_axes(model: NastranModel, card: Card, ends: list[Array]) -> Array | None:
-    """Return the axes of a bush, (3, 3), columns: of CID, else x along the element and y towards the vector.
+    """Return the axes of a bush as columns, (3, 3): those of CID, or x along the element and y towards the vector.
 
-    None if the vector is along the element.
+    Return None if the vector is along the element.
     """
     if card.text(8):
         return model.system(card, card.integer(8), ends[0])
@@ -185,8 +185,8 @@ def _bush_axes(model: NastranModel, card: Card, ends: list[Array]) -> Array | No
 def _scalar_spring(model: NastranModel, card: Card) -> None:
     """Read a spring or damper between equal components of two grid points.
 
-    Two forces along an axis balance only on one line: the points must lie at one place, or apart along this axis. Two
-    moments always balance.
+    Two opposite forces along an axis are in balance only if both points are on one line along this axis. Two opposite
+    moments always are.
     """
     if card.name in ("CELAS2", "CDAMP2"):
         value: float | None = card.real(2)
@@ -222,11 +222,12 @@ def _scalar_spring(model: NastranModel, card: Card) -> None:
 
 
 def _without_balance(model: NastranModel, card: Card, ends: list[tuple[int, int]], value: float) -> None:
-    """Take a scalar element whose forces do not balance where the deck holds an end of it: it acts to the ground.
+    """Convert a scalar element whose forces do not balance to an element to the ground if the deck fixes one end.
 
-    Between two free ends it is legal, but holds the body: what its forces lack acts on the ground. A free body has no
-    such tie, and to leave the element out with a note would take stiffness from within the body. So it is refused; its
-    ends become interfaces, for those who leave it out knowingly and put it into the system file.
+    Nastran also allows such an element between two free ends; it then holds the body, because the resultant of its
+    forces acts on the ground. A free body cannot have it, and omitting it with a mere note would remove stiffness
+    between points of the body. It is therefore refused. Its ends become interfaces, so that users who leave it out
+    explicitly can add it in the system file.
     """
     free = [(node, c) for node, c in ends if c not in model.held.get(node, set())]
     if not free:
@@ -270,9 +271,9 @@ def _bush_1d(model: NastranModel, card: Card) -> None:
 
 
 def _axes_along(model: NastranModel, card: Card, field: int | None) -> Array | None:
-    """Return axes of which x is that of the system in a field, or the line from GA to GB (no field, or a blank one).
+    """Return axes whose x is axis x of the system in a field, or from GA to GB if there is no field or it is blank.
 
-    None if no forces along x balance.
+    Return None if forces along x cannot be in balance.
     """
     ends = [model.point(card, card.integer(n)) for n in (3, 4)]
     apart = ends[1] - ends[0]
@@ -286,8 +287,8 @@ def _axes_along(model: NastranModel, card: Card, field: int | None) -> Array | N
 def _gap(model: NastranModel, card: Card) -> None:
     """Read CGAP: a linear spring in its initial state, as in linear solutions of Nastran.
 
-    Closed (U0 <= 0): KA along x, KT (MU1 KA where it is blank) across. Open: KB along x, 1e-14 KA where it is blank,
-    which is none here.
+    Closed gap (U0 <= 0): KA along x, and KT (MU1 KA if blank) normal to x. Open gap: KB along x. If KB is blank, its
+    value is 1e-14 KA, which is taken as zero here.
     """
     known = model.property_of(card, "PGAP")
     if known is None:

@@ -1,9 +1,10 @@
 """Superelements in one deck: main bulk data and the section of each BEGIN SUPER become one body.
 
-(1) each section is read with numbers, properties and systems of its own
-(2) a superelement lies as its section says, or where SELOC puts it; SEBULK REPEAT and MIRROR make images of another one
-(3) points of different superelements at one place are one point (SEBULK AUTO), as are pairs of SECONCT
-(4) the joined deck has the names of the main bulk data, and those of superelement k as `super_k_NAME`
+(1) each section is read with its own numbers, properties and systems
+(2) a superelement is placed as in its section, or where SELOC requires; SEBULK REPEAT and MIRROR are images of another
+    superelement
+(3) points of different superelements at one position become one point (SEBULK AUTO), and so do pairs of SECONCT
+(4) the joined deck has the names of the main bulk data; names in superelement k become `super_k_NAME`
 """
 
 from collections.abc import Mapping
@@ -23,10 +24,10 @@ from fe_models.meshes.cells.raw_mesh import RawBlock, RawMesh
 
 __all__ = ["MAIN_CARDS", "Superelement", "connect_superelements", "join_superelements", "place_superelements"]
 
-#: distance within which points are one where TOL of SEBULK is blank: our choice of MSC's default, printed as 10E-5;
-#: OptiStruct's guide has 1e-5
+#: distance within which points are one point if TOL of SEBULK is blank: our reading of MSC's default, which is printed
+#: as 10E-5; OptiStruct's guide has 1e-5
 TOLERANCE = 1e-4
-SAME_SHAPE = 1e-4  #: difference of distances between SELOC points over the largest distance, up to which they agree
+SAME_SHAPE = 1e-4  #: difference of distances of SELOC points divided by the largest one, up to which they agree
 KINDS = ("PRIMARY", "REPEAT", "MIRROR")
 MAIN_CARDS = ("SEBULK", "SELOC", "SEMPLN", "SECONCT", "SEEXCLD")  #: cards that are allowed only in the main bulk data
 #: fields of a deck that are those of its parts, one after another
@@ -43,7 +44,7 @@ class Superelement:
     source: int  #: number of the section that describes it: its own, or another one if it is an image
     motion: Motion
     tolerance: float | None  #: value TOL of its SEBULK
-    is_automatic: bool  #: whether its boundary is searched (METHOD = AUTO)
+    is_automatic: bool  #: whether its boundary is searched for (METHOD = AUTO)
 
     def positions(self, models: Mapping[int, NastranModel]) -> dict[int, Array]:
         """Return the position of each grid point in basic axes."""
@@ -56,7 +57,7 @@ def place_superelements(models: Mapping[int, NastranModel]) -> list[Superelement
     Parameters
     ----------
     models
-        Number of each section, 0 for the main bulk data -> its cards and grid points.
+        Cards and grid points of each section, by its number; 0 is the main bulk data.
     """
     main = models[0]
     options = {card.integer(1): card for card in main.of("SEBULK")}
@@ -140,7 +141,7 @@ def _located(card: Card, main: NastranModel, source: NastranModel, before: Motio
 def connect_superelements(models: Mapping[int, NastranModel], placed: list[Superelement]) -> dict[Key, Key]:
     """Step (3): return the representative point of each group of connected grid points.
 
-    What is held at such a point is held at the one that stands for it.
+    Components fixed at such a point become fixed at its representative.
     """
     ledger = models[0].ledger
     root: dict[Key, Key] = {}
@@ -264,7 +265,7 @@ def join_superelements(
 def _joined_mesh(parts: list[Deck], placed: list[Superelement], connected: dict[Key, Key]) -> RawMesh:
     """Return nodes, cells and groups of all superelements; connected points become one node.
 
-    Where numbers repeat, those of the k-th superelement have k times a power of ten added.
+    If numbers repeat, k times a power of ten is added to those of the k-th superelement.
     """
     place: dict[Key, int] = {}
     positions: list[Array] = []

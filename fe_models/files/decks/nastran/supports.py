@@ -20,7 +20,7 @@ def hold_points(model: NastranModel, *, find_plane: bool = True) -> None:
     Parameters
     ----------
     find_plane
-        False for sections of a deck, of which others may leave the plane.
+        False for a section of a deck, because other sections may leave the plane.
     """
     chosen = selected_sets(model, "SPC")
     if chosen == set() and any(name in model.cards for name in ("SPC", "SPC1")):
@@ -48,8 +48,9 @@ def hold_points(model: NastranModel, *, find_plane: bool = True) -> None:
 def _find_plane(model: NastranModel) -> None:
     """Find the plane to which a deck confines all element points, and remove the supports that do so.
 
-    A point is held in a plane if its translation along the normal and its rotations about the other two axes are held.
-    The remaining supports hold the body, or hold the rotation in the plane, for which membranes have no stiffness.
+    A point is confined to a plane if its translation along the normal and its rotations about the other two axes are
+    fixed. The remaining supports hold the body, or fix the rotation in the plane, for which membranes have no
+    stiffness.
     """
     points: set[int] = set()
     for name in (*ELEMENT_TYPES, *JOINING):
@@ -139,7 +140,7 @@ def make_supports(model: NastranModel) -> None:
 
 
 def _groups_of(model: NastranModel, held: dict[int, set[int]], what: str) -> None:
-    """Make a support for each set of components and, if relevant, axes. A grid point is in one support."""
+    """Make a support for each set of components and, if relevant, axes; each grid point is in one support."""
     if not held:
         return
     card = model.cards["GRID"][0]

@@ -38,10 +38,10 @@ class Taper:
 
 
 def cut_tapers(model: NastranModel) -> None:
-    """Divide each tapered beam into pieces with separate properties, between new nodes on the line of its ends.
+    """Divide each tapered beam into pieces with separate properties, between new nodes.
 
-    The first piece keeps the number of the beam. Released ends and offsets stay at the ends; the nodes between are on
-    the line from one offset end to the other.
+    The first piece keeps the number of the beam. Released ends and offsets remain at the ends. The new nodes are on the
+    line between both ends including offsets.
     """
     tapers: dict[int, tuple[Card, Taper]] = {}
     for name, taper_of in (("PBEAM", _pbeam_taper), ("PBEAML", _pbeaml_taper)):
@@ -131,7 +131,7 @@ def _stations(card: Card) -> tuple[list[int], int]:
 def _pbeam_taper(card: Card) -> Taper | None:
     """Return the taper of a PBEAM; None if it has no stations.
 
-    Blank fields of end B are those of end A, of other stations those between the ends.
+    For blank fields, end B has the values of end A, and other stations have interpolated values.
     """
     first = [card.real(FIRST + j, 0.0) for j in range(SIZES)]
     given: list[tuple[float, list[float | None]]] = []

@@ -76,8 +76,8 @@ class _Patch:
         """Return the motion of a point of the patch due to translations of its corners, (6 or 3, 3 n).
 
         (1) u = Σ N_i u_i
-        (2) theta by Kirchhoff's condition: in axes x, y in the patch and z across it, theta_x = w,y, theta_y = -w,x
-            and theta_z = (v,x - u,y)/2
+        (2) theta by Kirchhoff's condition: with axes x, y in the patch and z normal to it, theta_x = w,y,
+            theta_y = -w,x and theta_z = (v,x - u,y)/2
         """
         N, dN, tangents = self.at(place)
         translation = np.kron(N, np.eye(3))  # (1)
@@ -129,12 +129,14 @@ def _shells_of(model: NastranModel) -> _Shells:
 def read_welds(model: NastranModel) -> None:
     """Convert each CWELD to a massless round bar between two points that follow patches.
 
-    (1) The ends are GA and GB, or else the feet of GS on both patches. Without a patch B, GS is end B.
-    (2) GRIDID and ELEMID: an end has the motion of its patch there (`_Patch.motion`).
-    (3) ELPAT and PARTPAT: four points around an end follow the shells that they pierce along the axis of the weld; the
-        end has their mean motion. The points are the corners of a square of the area of the weld, pi D²/4.
+    (1) The ends are GA and GB, or the projections of GS onto both patches. Without a patch B, GS is end B.
+    (2) GRIDID and ELEMID: an end has the motion of its patch at this point (`_Patch.motion`).
+    (3) ELPAT and PARTPAT: four points around an end follow the shells on which they lie, projected along the axis of
+        the weld; the end has their mean motion. The points are the corners of a square with the area pi D²/4 of the
+        weld.
     (4) ALIGN: the ends are grid points.
-    (5) A uniform bar is a spring at its middle: EA/L, 12 EI/(L³ (1 + Phi)), GJ/L and EI/L, Phi = 12 EI/(G A_s L²).
+    (5) A uniform bar is equivalent to a spring at its middle with the stiffnesses EA/L, 12 EI/(L³ (1 + Phi)), GJ/L and
+        EI/L, where Phi = 12 EI/(G A_s L²).
     """
     cards = model.of("CWELD")
     shells = _shells_of(model) if cards else _Shells()
@@ -187,8 +189,9 @@ def _weld(model: NastranModel, shells: _Shells, card: Card) -> str:
 def _length_why(model: NastranModel, known: Card, L: float, D: float, thickness: float) -> str:
     """Return why the length of a weld is ambiguous; empty if it is not.
 
-    Older versions of Nastran scale the stiffness of a weld shorter or longer than LDMIN D and LDMAX D; newer ones do
-    not. A spot weld has half of both thicknesses as its length; its ends are moved, or its stiffness is scaled.
+    Older versions of Nastran scale the stiffness of a weld that is shorter than LDMIN D or longer than LDMAX D; newer
+    ones do not. The length of a spot weld is half of the sum of both thicknesses. Some versions move its ends to this
+    length, others scale its stiffness.
     """
     if not L > 0:
         return "has no length between its ends"
@@ -210,7 +213,7 @@ def _length_why(model: NastranModel, known: Card, L: float, D: float, thickness:
 def _patched_ends(
     model: NastranModel, shells: _Shells, card: Card, kind: str, D: float
 ) -> tuple[list[int], Array, float] | str:
-    """Return the nodes and points of both ends, and half of both thicknesses (0 if there is no patch B)."""
+    """Return nodes and positions of both ends, and half of the sum of both thicknesses (0 if there is no patch B)."""
     given = [card.integer(k, 0) for k in (5, 6)]
     start = _place(model, card)
     if start is None and not all(given):
@@ -279,7 +282,7 @@ def _place(model: NastranModel, card: Card) -> Array | None:
 def _patch_at(
     model: NastranModel, shells: _Shells, card: Card, kind: str, words: list[str], end: int, point: Array
 ) -> tuple[_Patch, Array, list[int]] | str:
-    """Return the patch at a point, the place of its foot, and the shells around it; a text says why there is none."""
+    """Return the patch at a point, the projection of the point, and the shells around it; or a text with the reason."""
     side = "AB"[end]
     if kind == "GRIDID":
         letters = card.text(7).upper()

@@ -89,8 +89,8 @@ def read_parameters(model: NastranModel, above: Iterable[Card]) -> None:
     Parameters
     ----------
     above
-        Those of the case control. They override those of the bulk data, as users of MSC Nastran describe it
-        (eng-tips.com, thread 484390); we know no manual that says so.
+        PARAM cards of the case control. They override those of the bulk data, as users of MSC Nastran report
+        (eng-tips.com, thread 484390); we know no manual that states this.
 
     Raises
     ------
@@ -132,7 +132,7 @@ def read_nastran_deck(path: Path, data: bytes) -> Deck:
     Raises
     ------
     MeshError
-        If the deck is damaged. What cannot be taken over is in the ledger.
+        If the deck is damaged. Content that cannot be converted is in the ledger.
     """
     where = f"deck {path}"
     included: dict[str, str] = {}

@@ -39,7 +39,7 @@ def calculix_neighbours(paths: Sequence[Path]) -> list[Path]:
     Parameters
     ----------
     paths
-        Of one model. Files of several names, or of other kinds among them, were chosen one by one: nothing is added.
+        Paths of one model. If they have different names or include other kinds of files, nothing is added.
     """
     names = {path.with_suffix("") for path in paths}
     given = {path.suffix.lower() for path in paths}
@@ -120,7 +120,7 @@ def read_labelled(path: Path, request: Request) -> ForeignMatrices:
 def joined_labels(where: str, data: bytes) -> bytes:
     """Return the lines as `key key value` with key = 10 node + dof + 1, by removing and replacing commas.
 
-    Node 12, dof 3 are written `12,3,`: without the comma between them they are the number 123, as a dof has one digit.
+    Node 12, dof 3 are written `12,3,`. Without the first comma they are the number 123, because a dof has one digit.
     """
     text = np.frombuffer(data.translate(None, delete=b" \t\r"), np.uint8).copy()
     commas = np.flatnonzero(text == COMMA[0])
@@ -178,9 +178,9 @@ def is_user_element(head: bytes) -> bool:
 def read_user_element(path: Path, request: Request) -> ForeignMatrices:
     """Read `*USER ELEMENT` with its nodes and dofs, and the triangles of `*MATRIX, TYPE=...`.
 
-    (1) nodes of the element: the comment below `** ELEMENT NODES`; a node may be listed for each of its dofs
-    (2) dofs: those of the first node, then `position, dofs` from which node on others hold
-    (3) a matrix: column j from row 1 to the diagonal, four numbers to a line
+    (1) nodes of the element: the comment below `** ELEMENT NODES`; a node may be listed once for each of its dofs
+    (2) dofs: those of the first node, then lines `position, dofs`; these dofs apply from the node at this position on
+    (3) matrix: column j from row 1 to the diagonal, four numbers on each line
 
     Raises
     ------

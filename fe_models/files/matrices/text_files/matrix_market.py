@@ -46,8 +46,8 @@ def role_by_stem(path: Path) -> str | None:
 def read_matrix_market(path: Path, request: Request) -> ForeignMatrices:
     """Read a matrix in coordinate or array form, or a vector with the node or dof of each row.
 
-    A file of one column is such a list: node numbers, one for every row or one for every 3 or 6 rows, and one of two
-    columns is (node, component from 1).
+    A file with one column is a list of node numbers, one for every row or one for every 3 or 6 rows. A file with two
+    columns is a list of (node, component from 1).
 
     Raises
     ------

@@ -58,9 +58,9 @@ def judged_bytes(data: np.ndarray) -> tuple[int, int, int]:
     Returns
     -------
     n_words, n_lines
-        Up to that place.
+        Number of words and of non-empty lines up to this position.
     bad
-        -1 if there is none.
+        Position of the first invalid byte; -1 if there is none.
     """
     count, bad = judged_pairs(data, KINDS, JUDGEMENT)
     return int(count[WORD]), int(count[FULL_LINE]), int(bad)

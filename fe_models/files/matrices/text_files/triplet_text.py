@@ -1,8 +1,8 @@
 """Text of matrix entries `row column value`, read by a compiled parser after a check of every byte.
 
-SciPy's Matrix Market parser is quick and reads what it can: of `3.0D+03` it takes 3.0, of a line with more columns the
-first three, of `1.5e` 1.5. So the bytes are judged before: only numbers in the grammar of C, three to a line, and a
-last line that ends.
+SciPy's Matrix Market parser is fast, but accepts invalid text: it reads `3.0D+03` as 3.0, `1.5e` as 1.5, and only the
+first three columns of a longer line. All bytes are therefore checked first. Only numbers in the syntax of C are
+allowed, three on each line, and the last line must end with a line break.
 """
 
 import io
@@ -26,16 +26,16 @@ def parsed_triplets(where: str, data: bytes, *, first_line: int = 1) -> tuple[In
     Parameters
     ----------
     where
-        The file, for messages.
+        Name of the file, for messages.
     data
-        The lines.
+        Lines of the text.
     first_line
-        Number of the first of them in the file.
+        Line number of the first line in the file.
 
     Raises
     ------
     MatrixError
-        If a line is not two whole numbers from 1 and a finite real, or the last one does not end.
+        If a line does not consist of two integers from 1 and a finite real number, or the last line does not end.
     """
     if not data.endswith(b"\n"):
         raise MatrixError(
@@ -62,7 +62,7 @@ def parsed_triplets(where: str, data: bytes, *, first_line: int = 1) -> tuple[In
 def triplet_matrix(where: str, role: str, data: bytes) -> tuple[sp.csc_array, str, bool]:
     """Return the matrix in a text of entries, the stored triangle, and whether any entry is nonzero.
 
-    It has as many rows as the largest number says.
+    The largest index is the number of rows.
 
     Raises
     ------

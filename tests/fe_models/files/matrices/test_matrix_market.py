@@ -262,7 +262,7 @@ def test_what_is_wrong_with_a_harwell_boeing_file_is_said(tmp_path):
     with pytest.raises(MatrixError, match="expected a real, assembled matrix"):
         fe_models.files.read_matrices(path)
     path.write_text(text.replace(f"{12:14d}{12:14d}", f"{12:14d}{10**13:14d}"))
-    with pytest.raises(MatrixError, match="expected rows, columns, entries"):
+    with pytest.raises(MatrixError, match="expected the numbers of rows, columns and entries"):
         fe_models.files.read_matrices(path)
     path.write_text(text[:-200])
     with pytest.raises(MatrixError, match=r"K\.rsa"):

@@ -26,7 +26,7 @@ def test_an_op4_file_takes_rows_and_places_from_the_punch_file_beside_it():
         assert_allclose(mine, other, rtol=0, atol=1e-14 * abs(other).max())
     assert_array_equal(read.node_numbers, [3, 11, 19, 27])
     assert_allclose(read.nodes, [element.positions[number] for number in (3, 11, 19, 27)])
-    assert "rows and places of outboard.op4 from outboard.pch" in " ".join(read.notes)
+    assert "rows and node positions of outboard.op4 were read from outboard.pch" in " ".join(read.notes)
     assert {"MUG1", "MEF1"} <= set(read.others)
 
 
