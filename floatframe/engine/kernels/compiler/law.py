@@ -27,7 +27,8 @@ __all__ = ["LawEntryCompiler", "block_at", "lean_law", "new_vector"]
 #: options of `njit` and `register_jitable` that do not change results
 SAME = {"nopython", "nogil", "boundscheck", "error_model", "cache", "no_cpython_wrapper"}
 
-#: inner function for each replaced function, by the identity of the latter, which is kept alive; None while compiling
+#: id(function) -> (function, its inner function). The function is stored so that its id is not reused; the inner
+#: function is None while it is being compiled
 made: dict[int, tuple[Any, Any]] = {}
 
 
