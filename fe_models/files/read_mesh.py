@@ -7,6 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from fe_models.entry_points import Registry
 from fe_models.errors import FeModelsError, MeshError
 from fe_models.files.abaqus import read_abaqus
 from fe_models.files.cad.cad_units import CAD_SUFFIXES
@@ -83,7 +84,8 @@ def geometry_from_raw(raw: RawMesh, path: Path, digest: str) -> Mesh | NodeCloud
 
 M = TypeVar("M")
 
-MESH_FORMATS: dict[str, tuple[str, Callable[[Path, bytes], RawMesh]]] = {
+#: format and reader (path, content) by suffix: those of this project, and those of other packages by entry points
+MESH_FORMATS: Registry[tuple[str, Callable[[Path, bytes], RawMesh]]] = Registry("fe_models.readers", {
     ".msh": ("Gmsh", read_gmsh),
     ".vtk": ("VTK", read_vtk),
     ".vtu": ("VTK", read_vtk),
@@ -95,7 +97,7 @@ MESH_FORMATS: dict[str, tuple[str, Callable[[Path, bytes], RawMesh]]] = {
     ".blk": ("Nastran", read_nastran),
     ".bulk": ("Nastran", read_nastran),
     ".med": ("MED", read_med),
-}  #: format and reader (path, content) for each suffix
+}, MeshError, prefix=".", made=lambda reader, package: (package, reader))  # fmt: skip
 
 
 def read_mesh(path: str | Path) -> Mesh:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from cms.errors import ModeSetError
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets.assumed import assumed_modes
 from cms.modes.mode_sets.balanced import balanced_truncation
@@ -17,6 +18,7 @@ from cms.modes.mode_sets.free_interface import craig_chang, dual_craig_bampton, 
 from cms.modes.mode_sets.given_columns import user_basis
 from cms.modes.mode_sets.krylov import krylov
 from cms.modes.mode_sets.multilevel import multilevel
+from fe_models.entry_points import Registry
 
 __all__ = [
     "MODE_SETS",
@@ -39,7 +41,8 @@ __all__ = [
     "user_basis",
 ]
 
-MODE_SETS: dict[str, Callable[..., ModeSet]] = {
+#: mode sets by name: those of this project, and those of other packages by entry points (docs/extending.md)
+MODE_SETS: Registry[Callable[..., ModeSet]] = Registry("cms.mode_sets", {
     "guyan": guyan,
     "craig-bampton": craig_bampton,
     "craig-bampton-ir": craig_bampton_ir,
@@ -57,7 +60,7 @@ MODE_SETS: dict[str, Callable[..., ModeSet]] = {
     "balanced-truncation": balanced_truncation,
     "assumed-modes": assumed_modes,
     "user-basis": user_basis,
-}
+}, ModeSetError)  # fmt: skip
 
 #: mode sets with one column for each boundary dof
 INTERFACE_SETS = (

@@ -14,7 +14,9 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
+from typing import TypeGuard
 
+from fe_models.entry_points import Registry
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.model.elements.element import Element
@@ -23,6 +25,17 @@ __all__ = ["element_class"]
 
 #: packages of floatframe in which elements are searched first
 OWN = ("floatframe.components", "floatframe.model")
+
+
+def is_element(found: object) -> TypeGuard[type[Element]]:
+    """Whether an object is a class of elements."""
+    return isinstance(found, type) and issubclass(found, Element)
+
+
+#: element classes of other packages by entry points, "PACKAGE.ELEMENT"
+ELEMENT_TYPES: Registry[type[Element]] = Registry(
+    "floatframe.elements", {}, ModelError, kind="a class that derives from Element", is_kind=is_element
+)
 
 
 def element_class(name: str, folder: Path | None = None) -> type[Element]:
@@ -43,6 +56,8 @@ def element_class(name: str, folder: Path | None = None) -> type[Element]:
     package, _, element = name.rpartition(".")
     if not package or not element:
         raise ModelError(f'type of element {quoted(name)}: expected "PACKAGE.ELEMENT", such as "wheels.linear-tyre"')
+    if not any(is_module(f"{wing}.{package}") for wing in OWN) and name in ELEMENT_TYPES:
+        return ELEMENT_TYPES[name]
     with searched(folder):
         module = package_named(name, package)
         known = getattr(module, "ELEMENTS", None)
@@ -73,15 +88,19 @@ def searched(folder: Path | None) -> Iterator[None]:
         sys.path.remove(added)
 
 
+def is_module(name: str) -> bool:
+    """Whether there is a module of a name on Python's path."""
+    try:
+        return find_spec(name) is not None
+    except (ImportError, ValueError):
+        return False
+
+
 def package_named(name: str, package: str) -> ModuleType:
     """Return the imported package of elements."""
     where = f"type of element {quoted(name)}"
     for each in (*(f"{wing}.{package}" for wing in OWN), package):
-        try:
-            is_there = find_spec(each) is not None
-        except (ImportError, ValueError):
-            is_there = False
-        if not is_there:
+        if not is_module(each):
             continue
         try:
             return import_module(each)
@@ -104,7 +123,7 @@ def class_at(name: str, place: str, package: str) -> type[Element]:
             f"{where}: module {module_name} of package {package} cannot be imported: {type(error).__name__}: {error}"
         ) from error
     found = getattr(module, class_name, None)
-    if not (isinstance(found, type) and issubclass(found, Element)):
+    if not is_element(found):
         raise ModelError(
             f"{where}: {place}: expected a class that derives from floatframe.model.elements.Element, got {found!r}"
         )

@@ -1,0 +1,143 @@
+"""A package of its own adds a mode set, an element and a reader by entry points, without an edit here."""
+
+import subprocess
+import sys
+
+import pytest
+
+from tests.root import ROOT
+
+CODE = '''
+"""A mode set, an element and a reader of another package."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from cms.modes.families.families import families_of
+from cms.modes.mode_set import constraint_block, mode_set
+from fe_models.meshes.cells.raw_mesh import RawBlock, RawMesh
+from floatframe import Marker
+from floatframe.model import Element, ElementLaw
+
+
+def static(body):
+    """Constraint modes alone."""
+    with families_of(body) as families:
+        return mode_set("static", families, [constraint_block(families)])
+
+
+def read_plain(path, content):
+    """Return one tetrahedron with edges of the length that the file holds."""
+    nodes = float(content) * np.array([(0.0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)])
+    return RawMesh(nodes, (RawBlock("tetra", np.array([[0, 1, 2, 3]])),))
+
+
+@njit
+def push(t, x, z, lam, data, wrench, z_dot, g, outputs):
+    wrench[0, 2] = data[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Push(Element):
+    """A constant force along z."""
+
+    name: str
+    marker: Marker
+    force: float
+
+    def law(self, placed):
+        return ElementLaw(function=push, data=[self.force])
+'''
+
+POINTS = """
+[cms.mode_sets]
+static = acme_fe:static
+rubin = acme_fe:static
+broken = acme_fe.nowhere:missing
+
+[floatframe.elements]
+acme.push = acme_fe:Push
+acme.broken = acme_fe.nowhere:missing
+acme.number = acme_fe:np
+
+[fe_models.readers]
+plain = acme_fe:read_plain
+broken = acme_fe.nowhere:missing
+"""
+
+USE = """
+import logging, pathlib
+import numpy as np
+import cms, fe_models, floatframe as ff
+from floatframe.model.elements.registry import element_class
+from tests.bodies import bar
+
+body = cms.couple(bar())
+assert "static" in cms.MODE_SETS and "static" in list(cms.MODE_SETS)
+np.testing.assert_array_equal(cms.MODE_SETS["static"](body).columns, cms.modes.guyan(body).columns)
+assert cms.MODE_SETS["rubin"].__module__.startswith("cms."), "a set of this project is not replaced"
+
+pathlib.Path("one.plain").write_text("2.0")
+mesh = fe_models.read_mesh("one.plain")
+assert mesh.nodes.max() == 2.0
+
+assert element_class("acme.push").__name__ == "Push"
+pathlib.Path("push.toml").write_text('''
+kind = "system"
+[system]
+units = "m-kg-s"
+[bodies.block]
+mass = 2.0
+inertia = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+[elements.up]
+type = "acme.push"
+marker = {body = "block"}
+force = 3.0
+[run]
+t_end = 1.0
+h = 0.01
+''')
+system, run = ff.read_system("push.toml")
+motion = ff.integrate(system, run.integrator, run.t_end, run.h)
+np.testing.assert_allclose(motion.body("block").r[-1, 2], 0.75, rtol=1e-9)
+
+for call, error in (
+    (lambda: cms.MODE_SETS["broken"], cms.errors.ModeSetError),
+    (lambda: element_class("acme.broken"), ff.errors.ModelError),
+    (lambda: element_class("acme.number"), ff.errors.ModelError),
+    (lambda: fe_models.read_mesh(pathlib.Path("one.plain").rename("one.broken")), fe_models.errors.MeshError),
+):
+    try:
+        call()
+    except error as told:
+        print(told)
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Return a folder with a package as pip would install it."""
+    (tmp_path / "acme_fe.py").write_text(CODE)
+    about = tmp_path / "acme_fe-1.2.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: acme-fe\nVersion: 1.2\n")
+    (about / "entry_points.txt").write_text(POINTS)
+    return tmp_path
+
+
+def test_a_package_adds_a_mode_set_an_element_and_a_reader(folder, monkeypatch):
+    """Used in Python and in files; what cannot be loaded is told with the name of its package, when it is used."""
+    monkeypatch.setenv("PYTHONPATH", f"{folder}:{ROOT}")
+    done = subprocess.run([sys.executable, "-c", USE], cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert [line.split(" of package ")[0] for line in lines] == [
+        "cms.mode_sets 'broken'", "floatframe.elements 'acme.broken'", "floatframe.elements 'acme.number'",
+        "fe_models.readers '.broken'",
+    ]  # fmt: skip
+    assert all(" of package acme-fe 1.2: " in line for line in lines)
+    assert "ModuleNotFoundError: No module named 'acme_fe.nowhere'" in lines[0]
+    assert "expected a class that derives from Element" in lines[2]
+    assert "cms.mode_sets 'rubin' of package acme-fe 1.2: left out, this project has it" in done.stderr
