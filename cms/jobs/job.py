@@ -55,9 +55,11 @@ def accepted(value: Any) -> tuple[str, ...]:
 
 
 def nodes_to_keep(value: Any) -> tuple[Any, ...]:
-    """Return the list of nodes to keep: node numbers, names of sets, and positions."""
+    """Return the list of nodes to keep: node numbers, names of sets, and positions; "all" keeps every node."""
+    if value == "all":
+        return ("all",)
     if not isinstance(value, list):
-        raise ValueError("expected a list of node numbers, names of sets, and positions [x, y, z]")
+        raise ValueError('expected "all", or a list of node numbers, names of sets, and positions [x, y, z]')
     entries: list[Any] = []
     for each in value:
         if isinstance(each, list):
@@ -156,7 +158,9 @@ class BodySection(Table):
         None, description="true or false, for matrices: whether slightly negative masses are set to zero"
     )
     incompatible_modes: bool = Field(False, description="true or false: bricks of eight nodes bend by internal modes")
-    keep: Keep = Field((), description="a list of nodes that are kept: numbers, names of sets, positions [x, y, z]")
+    keep: Keep = Field(
+        (), description='"all", or a list of nodes that are kept: numbers, names of sets, positions [x, y, z]'
+    )
     stress_points: StressPoints = Field(
         (),
         description='"all", or a list of elements, beams and shells, whose own stress is kept: numbers, names of sets',

@@ -74,6 +74,33 @@ class ModeSet:
         """Whether each column is static, (n_columns,) bool."""
         return np.isnan(self.frequencies)
 
+    def __add__(self, other: "ModeSet") -> "ModeSet":
+        """Return the columns of two sets of one body side by side; `reduce` drops those that depend on others."""
+        if not isinstance(other, ModeSet):
+            return NotImplemented
+        if len(self.columns) != len(other.columns):
+            raise ModeSetError(
+                f"{self.name} + {other.name}: expected mode sets of one body, got columns of {len(self.columns)} and "
+                f"of {len(other.columns)} dofs"
+            )
+        return ModeSet(
+            f"{self.name} + {other.name}",
+            beside(self.columns, other.columns),
+            (*self.labels, *other.labels),
+            np.concatenate([self.frequencies, other.frequencies]),
+            named_by_set(self, other, [self.options, other.options]),
+            (*self.groups, *other.groups),
+            named_by_set(self, other, [self.data, other.data]),
+        )
+
+
+def named_by_set(first: ModeSet, second: ModeSet, entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the entries of two sets in one dictionary; names that both have get the name of their set in front."""
+    own, other = entries
+    twice = own.keys() & other.keys()
+    found = {f"{first.name} {key}" if key in twice else key: value for key, value in own.items()}
+    return found | {f"{second.name} {key}" if key in twice else key: value for key, value in other.items()}
+
 
 # blocks of columns of one family -------------------------------------------------------------------------------------
 

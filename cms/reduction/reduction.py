@@ -103,8 +103,8 @@ def reduce(
         static solutions per kept node.
     keep
         Nodes to keep with translations and rotations, in addition to surface and interfaces: numbers of the user's
-        mesh, names of sets, or positions [x, y, z] in mesh axes (`fe_models.body.keep_nodes`). Nodes of lines and point
-        masses are always kept.
+        mesh, names of sets, or positions [x, y, z] in mesh axes (`fe_models.body.keep_nodes`); "all" keeps every node.
+        Nodes of lines and point masses are always kept.
     recovery
         Tables of recovery rows to add (`ReducedBody.recovery`): motions, stress, forces in elements and at interfaces,
         with their static part, which needs the factorisation.

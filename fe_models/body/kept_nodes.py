@@ -11,7 +11,9 @@ from fe_models.foundation.arrays import IntArray
 from fe_models.foundation.errors import BodyError
 from fe_models.meshes.numbering import NONE, node_place
 
-__all__ = ["TOLERANCE", "keep_nodes"]
+__all__ = ["ALL", "TOLERANCE", "keep_nodes"]
+
+ALL = "all"  #: a request for every node
 
 TOLERANCE = 1e-3  #: largest distance between a node and the position that selects it, over the size of the body
 
@@ -25,7 +27,7 @@ def keep_nodes(body: FEBody, keep: Sequence[Any]) -> FEBody:
         Coupled or not.
     keep
         Each entry is a node number (12, or "INSTANCE.12"), the name of a set, or a position [x, y, z] in mesh axes. A
-        position selects the node within 1e-3 of the size of the body.
+        position selects the node within 1e-3 of the size of the body. "all" selects every node.
 
     Raises
     ------
@@ -36,13 +38,15 @@ def keep_nodes(body: FEBody, keep: Sequence[Any]) -> FEBody:
     if not len(keep):
         return body
     where = f"body {body.name!r}: keep"
-    rows = [named_rows(body, where, each) for each in keep]
+    rows = [named_rows(body, where, each) for each in ([keep] if isinstance(keep, str) else keep)]
     return replace(body, kept=np.concatenate([body.kept, *rows]))
 
 
 def named_rows(body: FEBody, where: str, asked: Any) -> IntArray:
     """Return the nodes of one request: a node number, a set or a position."""
     numbering = body.numbering
+    if isinstance(asked, str) and asked == ALL:
+        return own_nodes(body, np.unique(mesh_nodes(body)))
     if isinstance(asked, str):
         prefix = asked.rpartition(".")[0]
         if asked not in numbering.set_names and prefix in numbering.instances:

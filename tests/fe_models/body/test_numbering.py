@@ -150,6 +150,8 @@ def test_nodes_are_kept_by_number_set_and_position():
     for keep in ([int(mesh.node_numbers[middle])], [mesh.nodes[middle] + 1e-4], ["left", [0.5, 0.5, 0.5]]):
         assert middle in keep_nodes(body, keep).kept
     assert_array_equal(keep_nodes(body, ["left"]).kept, mesh.node_sets["left"])
+    for everything in ("all", ["all"]):
+        assert_array_equal(keep_nodes(body, everything).kept, np.arange(len(mesh.nodes)))
     with pytest.raises(BodyError, match=rf"no node at \[0.6, 0.5, 0.5\].*nearest: node {mesh.node_numbers[middle]} at"):
         keep_nodes(body, [[0.6, 0.5, 0.5]])
     with pytest.raises(BodyError, match="expected the number of a node, the name of a set, or"):
