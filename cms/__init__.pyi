@@ -24,6 +24,7 @@ from .modes.mode_set import ModeSet as ModeSet
 from .modes.mode_sets import MODE_SETS as MODE_SETS
 from .modes.mode_sets.classical import craig_bampton as craig_bampton
 from .modes.mode_sets.free_interface import rubin as rubin
+from .pipeline import reduce_deck as reduce_deck
 from .pipeline import reduce_job as reduce_job
 from .reduction.basis.frames import NodalFrame as NodalFrame
 from .reduction.basis.frames import TisserandFrame as TisserandFrame

@@ -12,13 +12,13 @@
 """
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cms.body.reduced_body import ReducedBody
-from cms.errors import MemoryBudgetError
+from cms.errors import JobError, MemoryBudgetError
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import Job, read_job
 from cms.jobs.mode_set_of_job import frame_of, job_mode_set, reduction_of
@@ -26,9 +26,11 @@ from cms.linear_algebra.memory.budget import ReductionShape, columns_within, sol
 from cms.linear_algebra.memory.size import memory_bytes, resident_bytes
 from cms.linear_algebra.solvers.registry import solver_of
 from fe_models.body.fe_body import FEBody
+from fe_models.files.decks.deck import Deck
 from fe_models.foundation.ranks.mpi import all_ranks
 from fe_models.foundation.solver import Solver
 from fe_models.foundation.stages import Stages
+from fe_models.foundation.toml_file import validated
 
 if TYPE_CHECKING:
     from cms.modes.families.cost import Asked
@@ -36,7 +38,7 @@ if TYPE_CHECKING:
     from cms.modes.mode_set import ModeSet
     from cms.reduction.geometric_stiffness.unit_states import UnitStates
 
-__all__ = ["Plan", "budget_of", "expected_columns", "reduce_job", "reduced", "states_of_job"]
+__all__ = ["Plan", "budget_of", "expected_columns", "reduce_deck", "reduce_job", "reduced", "states_of_job"]
 
 log = logging.getLogger(__name__)
 
@@ -50,6 +52,7 @@ def reduce_job(
     solver: str | Solver | None = None,
     memory: str | float | None = None,
     on_report: Callable[[Any], None] | None = None,
+    deck: Deck | None = None,
 ) -> ReducedBody:
     """Process a job up to the reduced body.
 
@@ -67,6 +70,8 @@ def reduce_job(
         still does not fit fails before the factorisation. Overrides the value of the job. Default: no limit.
     on_report
         Receives the mesh report before it is checked.
+    deck
+        Content of the deck of the job, if it is known; it is not read again.
 
     Raises
     ------
@@ -85,7 +90,7 @@ def reduce_job(
     chosen = solver_of(solver or job.reduction.solver)  # a solver that is not installed is reported before any work
     budget = budget_of(job, solver, memory)
     ranks = None if chosen.spread is None else all_ranks()
-    body = job_body(job, stages, on_report=on_report, ranks=ranks)  # (2), (3)
+    body = job_body(job, stages, on_report=on_report, source=deck, ranks=ranks)  # (2), (3)
     plan = Plan.of(job, body, chosen, budget)  # (4)
     announce = not job.reduction.reduces_interfaces  # what many boundary dofs cost, unless their number is reduced
     with Families(body, announce=announce, solver=plan.solver, to_disk=plan.to_disk) as families:
@@ -98,6 +103,52 @@ def reduce_job(
         if job.recovery:  # the static part of recovery rows needs the factorisation
             return reduced(job, plan, families, modes, states, stages)  # (8)
     return reduced(job, plan, body, modes, states, stages)  # (8), with the memory of the factorisation free
+
+
+def reduce_deck(
+    path: Path | str,
+    *,
+    units: str,
+    reduction: Mapping[str, Any] | None = None,
+    program: str | None = None,
+    densities: Mapping[str, float] | None = None,
+    leave_out: Iterable[str] = (),
+    mass: str | None = None,
+    stages: Stages | None = None,
+) -> ReducedBody:
+    """Read a complete deck of another program, and reduce its body, without a job file.
+
+    The result is that of the job that `cms job` writes: supports of the deck become interfaces of a free body.
+
+    Parameters
+    ----------
+    path, units, program, densities, leave_out, mass
+        As for `fe_models.read_deck`.
+    reduction
+        Keys of the table [reduction] of a job, such as {"set": "rubin", "n_modes": 20}. Default: ten modes of
+        Craig-Bampton if the deck has supports, else ten normal modes.
+    stages
+        Receives durations and progress of the stages; None: neither is reported.
+
+    Raises
+    ------
+    CmsError, FeModelsError
+        If the deck cannot be read or converted, or the mode set is invalid.
+
+    Examples
+    --------
+    >>> body = cms.reduce_deck("arm.bdf", units="mm-t-s", reduction={"set": "rubin", "n_modes": 20})  # doctest: +SKIP
+    """
+    from cms.jobs.decks.job_text import job_tables
+    from fe_models.files.decks.model_of_deck import DeckOptions
+    from fe_models.files.decks.read_deck import parse_deck
+
+    deck = parse_deck(path, program=program)
+    tables = job_tables(deck, DeckOptions(units, densities or {}, tuple(leave_out), mass), str(Path(path).resolve()))
+    if reduction is not None:
+        tables["reduction"] = dict(reduction)
+    job = validated(Job, tables, Path(path), JobError)
+    return reduce_job(job, stages, deck=deck)
 
 
 def states_of_job(job: Job, families: "Families") -> "UnitStates":

@@ -6,8 +6,9 @@ from pathlib import Path
 
 from cms.cli.console import output_path, print_table, say
 from cms.errors import JobError
-from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.decks.job_text import job_text
 from fe_models.assembly.model import MASSES_OF_ALL
+from fe_models.files.decks.model_of_deck import DeckOptions
 from fe_models.foundation.units import UNIT_SYSTEMS
 from fe_models.foundation.words import nearest, quoted
 
@@ -29,7 +30,7 @@ class DeckRequest:
 
 def write_job(request: DeckRequest) -> None:
     """Read the deck, print which cards are not converted, and write the job."""
-    from fe_models.files.decks.read_deck import read_deck
+    from fe_models.files.decks.read_deck import parse_deck
 
     if request.units is None or request.units not in UNIT_SYSTEMS:
         what = "missing; a deck does not say its units" if request.units is None else f"unknown {quoted(request.units)}"
@@ -37,8 +38,8 @@ def write_job(request: DeckRequest) -> None:
     if request.mass not in (None, *MASSES_OF_ALL):
         raise JobError(f"--mass: unknown {quoted(request.mass)}{nearest(request.mass, MASSES_OF_ALL)}")
     path = output_path(request.output, request.deck.with_suffix(".toml"), JobError, overwrite_of=[request.deck])
-    deck = read_deck(request.deck, program=request.program)
-    asked = JobRequest(request.units, densities_of(request.densities), request.leave_out, request.mass)
+    deck = parse_deck(request.deck, program=request.program)
+    asked = DeckOptions(request.units, densities_of(request.densities), request.leave_out, request.mass)
     relative = os.path.relpath(request.deck.resolve(), path.resolve().parent)
     try:
         text = job_text(deck, asked, Path(relative).as_posix())

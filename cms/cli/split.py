@@ -160,7 +160,7 @@ def parts_damping(job: Job, texts: list[str], parts: "tuple[Any, ...]") -> "Part
             path = Path(folder) / "part.toml"
             path.write_text(text, encoding="utf-8")
             part = read_job(path)
-            bodies.append(job_body(part, mesh=mesh if is_of_mesh(part) else None))
+            bodies.append(job_body(part, source=mesh if is_of_mesh(part) else None))
 
     def ratios(omega2: np.ndarray) -> np.ndarray:
         if isinstance(damping, PerModeDamping):

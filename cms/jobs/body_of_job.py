@@ -20,6 +20,7 @@ from fe_models.foundation.units import UNIT_SYSTEMS
 from fe_models.meshes.mesh import Mesh, drop_unused_nodes
 
 if TYPE_CHECKING:
+    from fe_models.files.decks.deck import Deck
     from fe_models.meshes.line_mesh import LineMesh
     from fe_models.meshes.selections import AnyMesh
     from fe_models.meshes.shell_mesh import ShellMesh
@@ -30,24 +31,25 @@ __all__ = [
 ]  # fmt: skip
 
 
-def model_of_job(job: Job, stages: Stages, mesh: "AnyMesh | None" = None) -> FEModel:
+def model_of_job(job: Job, stages: Stages, source: "Mesh | Deck | None" = None) -> FEModel:
     """Return the model of a job with a mesh or a deck: what is read from the file, and the tables of the job.
 
     Parameters
     ----------
-    mesh
-        The solid mesh of the job, where it is known.
+    source
+        Solid mesh or deck of the job, if it is known; it is not read again.
     """
     name, units, accept = str(job.body.name), UNIT_SYSTEMS[job.body.units], job.body.accept
     if job.body.deck is not None:
-        from fe_models.files.decks.read_deck import read_deck
+        from fe_models.files.decks.read_deck import parse_deck
 
         with stages("read deck"):
-            deck = read_deck(job.body.deck, program=job.body.program)
+            deck: Any = source or parse_deck(job.body.deck, program=job.body.program)
         return FEModel(
             name, units, deck.mesh, job, mass=job.body.mass, plane=job.body.plane, accept=accept,
             lumped=deck.lumped, source=job.body.deck, are_faces_names=deck.is_plain_mesh,
         )  # fmt: skip
+    mesh: Any = source
     if mesh is None:
         with stages("read mesh" if job.mesh_size is None else "mesh"):
             mesh = mesh_of_job(job)
@@ -127,12 +129,14 @@ def frame_mesh(job: Job) -> "LineMesh":
 # beams tied to a solid ------------------------------------------------------------------------------------------------
 
 
-def tied_body(job: Job, stages: Stages, on_report: Callable[[Any], None] | None, mesh: Mesh | None) -> FEBody:
+def tied_body(
+    job: Job, stages: Stages, on_report: Callable[[Any], None] | None, source: "Mesh | Deck | None"
+) -> FEBody:
     """Assemble solid and beams of a job, tie the beams to the solid, and put the interfaces on both."""
     from fe_models.body.couplings.couplings import couple
     from fe_models.body.weld import weld
 
-    model, lines = model_of_job(job, stages, mesh), frame_mesh(job)
+    model, lines = model_of_job(job, stages, source), frame_mesh(job)
     of_solid, of_lines = {}, {}
     for name, tie in job.ties.items():
         point = tuple(lines.nodes[one_node(lines, f"ties.{name}.node", tie.node)].tolist())
@@ -143,7 +147,7 @@ def tied_body(job: Job, stages: Stages, on_report: Callable[[Any], None] | None,
         for tables, places in ((model.tables, of_solid), (job, of_lines))
     )
     beams = FEModel(f"{model.name} beams", model.units, lines, on_lines, accept=model.accept)
-    solid = assemble(replace(model, tables=on_solid), stages=stages, on_report=on_report, is_checked=mesh is not None)
+    solid = assemble(replace(model, tables=on_solid), stages=stages, on_report=on_report, is_checked=source is not None)
     frame = assemble(beams, stages=stages, on_report=on_report)
     with stages("weld"):
         pairs = [((solid.name, name), (frame.name, name)) for name in job.ties]
@@ -215,21 +219,21 @@ def job_body(
     stages: Stages | None = None,
     *,
     on_report: Callable[[Any], None] | None = None,
-    mesh: Mesh | None = None,
+    source: "Mesh | Deck | None" = None,
     ranks: Ranks | None = None,
 ) -> FEBody:
     """Process a job up to the coupled body: read, check, assemble, and couple the interfaces.
 
     Parameters
     ----------
-    mesh
-        Solid mesh of the job without unused nodes, if it is known; it is not read or checked again.
+    source
+        Solid mesh of the job without unused nodes, if it is known, which is not read or checked again; or its deck.
     ranks
         Processes that assemble a body of a single solid mesh in parts (`fe_models.solid_body`). K and M of other bodies
         are assembled in this process, and then distributed over the ranks.
     """
     stages = stages or Stages()
-    body = uncoupled_body(job, stages, on_report=on_report, mesh=mesh, ranks=ranks)
+    body = uncoupled_body(job, stages, on_report=on_report, source=source, ranks=ranks)
     with stages("couple interfaces"):
         body = coupled_body(job, body)
     return body if ranks is None else spread_body(body, ranks)
@@ -255,7 +259,7 @@ def uncoupled_body(
     stages: Stages,
     *,
     on_report: Callable[[Any], None] | None = None,
-    mesh: Mesh | None = None,
+    source: "Mesh | Deck | None" = None,
     ranks: Ranks | None = None,
 ) -> FEBody:
     """Process a job up to the body with uncoupled interfaces, and with the requested nodes and points.
@@ -265,10 +269,10 @@ def uncoupled_body(
     if job.body.matrices is not None:
         body = body_of_matrices(job, stages, on_report)
     elif job.ties:
-        body = tied_body(job, stages, on_report, mesh)
+        body = tied_body(job, stages, on_report, source)
     else:
-        model = model_of_job(job, stages, mesh)
-        body = assemble(model, stages=stages, on_report=on_report, is_checked=mesh is not None, ranks=ranks)
+        model = model_of_job(job, stages, source)
+        body = assemble(model, stages=stages, on_report=on_report, is_checked=source is not None, ranks=ranks)
     if job.body.keep:
         from fe_models.body.kept_nodes import keep_nodes
 

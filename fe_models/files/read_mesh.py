@@ -144,12 +144,12 @@ def read_geometry(path: str | Path) -> Mesh | NodeCloud:
     MeshError
         As for `read_mesh`, but elements may be of any kind.
     """
-    from fe_models.files.decks.read_deck import DECK_FORMATS, read_deck
+    from fe_models.files.decks.read_deck import DECK_FORMATS, parse_deck
 
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix in DECK_FORMATS and (suffix not in MESH_FORMATS or MESH_FORMATS[suffix][1] is read_nastran):
-        return geometry_from_raw(read_deck(path).mesh, path, file_digest(str(path)))  # coordinate systems, INCLUDE
+        return geometry_from_raw(parse_deck(path).mesh, path, file_digest(str(path)))  # coordinate systems, INCLUDE
     return _read(path, geometry_from_raw)
 
 

@@ -13,9 +13,10 @@ from scipy.linalg import block_diag
 from scipy.spatial.transform import Rotation
 
 from cms.jobs.body_of_job import uncoupled_body
-from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.model_of_deck import DeckOptions
+from fe_models.files.decks.read_deck import parse_deck
 from fe_models.foundation.stages import Stages
 from tests.campaign.deck_bodies import Expected, words, wrong_body
 from tests.campaign.verdict import ACCEPTED, REFUSED, WRONG, Verdict
@@ -229,7 +230,7 @@ def wrong_deck(deck: AbaqusDeck, folder: Path) -> str:
     """Return what of the body differs from the assembler; empty: nothing."""
     path = folder / "model.inp"
     path.write_text("\n".join(deck.lines) + "\n")
-    job = job_text(read_deck(path, program=deck.program), JobRequest("m-kg-s", {}), path.name)
+    job = job_text(parse_deck(path, program=deck.program), DeckOptions("m-kg-s", {}), path.name)
     path.with_suffix(".toml").write_text(job.replace("[body]", '[body]\naccept = ["parts"]'))
     body = uncoupled_body(read_job(path.with_suffix(".toml")), Stages())
     numbers = body.numbering.nodes[: len(body.nodes)]

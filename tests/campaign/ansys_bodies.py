@@ -13,9 +13,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cms.jobs.body_of_job import uncoupled_body
-from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.model_of_deck import DeckOptions
+from fe_models.files.decks.read_deck import parse_deck
 from fe_models.foundation.stages import Stages
 from tests.campaign.verdict import ACCEPTED, REFUSED, WRONG, Verdict
 
@@ -304,7 +305,7 @@ def wrong_deck(deck: AnsysDeck, folder: Path) -> str:
     """Return what of the body differs from the assembler; empty: nothing."""
     path = folder / "model.cdb"
     path.write_text(deck.text())
-    job = job_text(read_deck(path), JobRequest("m-kg-s", {}), path.name)
+    job = job_text(parse_deck(path), DeckOptions("m-kg-s", {}), path.name)
     path.with_suffix(".toml").write_text(job.replace("[body]", '[body]\naccept = ["parts", "units"]'))
     body = uncoupled_body(read_job(path.with_suffix(".toml")), Stages())
     numbers = body.numbering.nodes[: len(body.nodes)]

@@ -17,9 +17,10 @@ from scipy.linalg import eigh
 from scipy.sparse.linalg import eigsh, spsolve
 
 from cms.jobs.body_of_job import uncoupled_body
-from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.model_of_deck import DeckOptions
+from fe_models.files.decks.read_deck import parse_deck
 from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.stages import Stages
 
@@ -107,8 +108,8 @@ def frequency_deck(text):
 
 def body_of(path):
     """The deck, and its body by way of its job."""
-    deck = read_deck(path)
-    text = job_text(deck, JobRequest("m-kg-s", {"": 1.0}), path.name)
+    deck = parse_deck(path)
+    text = job_text(deck, DeckOptions("m-kg-s", {"": 1.0}), path.name)
     job = path.with_suffix(".toml")
     job.write_text(text.replace("[body]\n", f"[body]\naccept = {ACCEPTED}\n"))
     return deck, uncoupled_body(read_job(job), Stages())

@@ -9,22 +9,23 @@ import tempfile
 from pathlib import Path
 
 from cms.jobs.body_of_job import coupled_body, uncoupled_body
-from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
-from fe_models.files.decks.read_deck import DECK_FORMATS, read_deck
+from fe_models.files.decks.model_of_deck import DeckOptions
+from fe_models.files.decks.read_deck import DECK_FORMATS, parse_deck
 from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.stages import Stages
 
 
 def make_body(path: Path, folder: Path) -> None:
     """Make the body of a deck by way of its job, which is written into a folder."""
-    deck = read_deck(path)
+    deck = parse_deck(path)
     try:
-        text = job_text(deck, JobRequest("m-kg-s", {}), str(path.resolve()))
+        text = job_text(deck, DeckOptions("m-kg-s", {}), str(path.resolve()))
     except ReportedError as error:
         if "density" not in str(error):
             raise
-        text = job_text(deck, JobRequest("m-kg-s", {"": 7800.0}), str(path.resolve()))
+        text = job_text(deck, DeckOptions("m-kg-s", {"": 7800.0}), str(path.resolve()))
     job = folder / f"{path.stem}.toml"
     job.write_text(text.replace("[body]", '[body]\naccept = ["units", "parts"]', 1))
     made = read_job(job)

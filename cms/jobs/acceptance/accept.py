@@ -1,9 +1,7 @@
 """Acceptance of a body: checks, comparison with its full model or deck, and range of use."""
 
-import os
-import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,17 +27,18 @@ from cms.jobs.acceptance.acceptance import Acceptance, LeftOut, MeshError, now
 from cms.jobs.acceptance.origin import source_files
 from cms.jobs.acceptance.range_of_use import custom_band, range_of_use
 from cms.jobs.body_of_job import coupled_body, model_of_job, uncoupled_body
-from cms.jobs.decks.job_text import JobRequest, job_text
 from cms.jobs.job import Job, read_job
 from cms.jobs.mode_set_of_job import job_mode_set, reduction_of, reduction_options
 from cms.jobs.studies.mesh_convergence import mesh_convergence
 from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.modes.families.families import Families
+from fe_models.assembly.assemble import assemble
 from fe_models.assembly.tables.materials import solid_properties
 from fe_models.body.fe_body import FEBody
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.errors import FeModelsError
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.model_of_deck import DeckOptions, model_of_deck
+from fe_models.files.decks.read_deck import parse_deck
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.stages import Stages
 from fe_models.foundation.units import UNIT_SYSTEMS
@@ -107,18 +106,16 @@ def accept(
         job = read_job(Path(full.job))
         records, compared = against_job(job, Path(full.job), reduced, own, band, stages)
         if job.body.deck is not None:
-            left_out = cards_left_out(read_deck(job.body.deck))
+            left_out = cards_left_out(parse_deck(job.body.deck))
     elif full.deck is not None:
-        deck = read_deck(Path(full.deck), program=full.program)
+        deck = parse_deck(Path(full.deck), program=full.program)
         left_out = cards_left_out(deck)
-        with tempfile.TemporaryDirectory(prefix="acceptance-") as folder:
-            job = job_of_deck(deck, full, reduced, Path(folder))
-            with stages("full model"):
-                body = uncoupled_body(job, stages)
-            records = (*own, *compare_with_model(body, reduced, band=band or band_of(reduced)))
-            compared = f"the deck {full.deck}, {body.n_dof} dofs, its supports removed"
+        with stages("full model"):
+            body = body_of_deck(deck, full, reduced)
+        records = (*own, *compare_with_model(body, reduced, band=band or band_of(reduced)))
+        compared = f"the deck {full.deck}, {body.n_dof} dofs, its supports removed"
     elif (deck_path := reduced.provenance.get("deck")) and Path(deck_path).is_file():
-        left_out = cards_left_out(read_deck(Path(deck_path)))
+        left_out = cards_left_out(parse_deck(Path(deck_path)))
     if left_out is not None:
         records = (*records, left_out_record(left_out))
     if band is not None:
@@ -187,20 +184,16 @@ def band_of(reduced: ReducedBody) -> float:
     return band
 
 
-def job_of_deck(deck: "Deck", full: FullModel, reduced: ReducedBody, folder: Path) -> Job:
-    """Return the job for a deck in units of the body; unconverted data are omitted and listed."""
+def body_of_deck(deck: "Deck", full: FullModel, reduced: ReducedBody) -> FEBody:
+    """Return the free body of a deck in units of the reduced body; unconverted data are omitted."""
     if reduced.units.name not in UNIT_SYSTEMS:
         raise QualityError(
             f"body {reduced.name!r}: is in units {quoted(reduced.units.name)} of its own; convert it (cms frame "
             "--units), so that the deck can be read in the same"
         )
     names = tuple(dict.fromkeys(entry.name for entry in deck.ledger.entries.values() if entry.is_body))
-    request = JobRequest(reduced.units.name, full.densities, names)
-    assert full.deck is not None
-    path = folder / "deck.toml"
-    path.write_text(job_text(deck, request, os.fspath(Path(full.deck).resolve())), encoding="utf-8")
-    job = read_job(path)
-    return job.model_copy(update={"interfaces": {}, "load_cases": {}})
+    model = model_of_deck(deck, DeckOptions(reduced.units.name, full.densities, names))
+    return assemble(replace(model, tables=model.tables.model_copy(update={"interfaces": {}, "load_cases": {}})))
 
 
 def cards_left_out(deck: "Deck") -> tuple[LeftOut, ...]:
@@ -235,7 +228,7 @@ def effective_masses(reduced: ReducedBody) -> tuple[EffectiveMass, ...]:
 def mesh_error(job: Job | None, most_dofs: int, stages: Stages) -> MeshError:
     """Estimate the effect of the mesh size on the lowest frequencies, if the job allows it."""
     if job is None:
-        return MeshError("not estimated: no full model was given that could be refined")
+        return MeshError("not estimated: no job was given whose mesh could be refined")
     if not most_dofs:
         return MeshError("not estimated, as asked")
     try:

@@ -214,7 +214,7 @@ def body_maker(path: Path, parameters: tuple[Parameter, ...]) -> Callable[[Array
                 model = model_of_job(job, Stages())
                 assemble(model)  # checks the mesh
                 meshes.append(drop_unused_nodes(model.mesh))
-            made[key] = job_body(job, mesh=meshes[0] if meshes else None)
+            made[key] = job_body(job, source=meshes[0] if meshes else None)
         return made[key]
 
     return body_at

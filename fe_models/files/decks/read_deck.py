@@ -12,7 +12,7 @@ from fe_models.foundation.paths import near_file
 from fe_models.foundation.words import damage, nearest, quoted
 from fe_models.meshes.cells.raw_mesh import require_nodes
 
-__all__ = ["DECK_FORMATS", "read_deck"]
+__all__ = ["DECK_FORMATS", "parse_deck"]
 
 DECK_FORMATS: dict[str, Callable[..., Deck]] = {
     ".inp": read_abaqus_deck,
@@ -28,7 +28,7 @@ DECK_FORMATS: dict[str, Callable[..., Deck]] = {
 }  #: reader (path, content, program) for each suffix
 
 
-def read_deck(path: str | Path, *, program: str | None = None) -> Deck:
+def parse_deck(path: str | Path, *, program: str | None = None) -> Deck:
     """Read a complete deck: mesh, materials, sections, couplings, supports, loads, and the ledger of other data.
 
     Parameters

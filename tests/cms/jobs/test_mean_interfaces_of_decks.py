@@ -6,10 +6,11 @@ from numpy.testing import assert_allclose
 
 import cms
 from cms.errors import BodyError
-from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.decks.job_text import job_text
 from fe_models.body.fe_body import Interface
 from fe_models.elements.solids.body import solid_body
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.model_of_deck import DeckOptions
+from fe_models.files.decks.read_deck import parse_deck
 from tests.bodies import STEEL, box_mesh
 
 BOX = box_mesh(3, 1, 1, 1.0, 0.1, 0.1)
@@ -32,7 +33,7 @@ def deck(*more):
 def job_of(folder, text):
     path = folder / "bar.inp"
     path.write_text(text)
-    path.with_suffix(".toml").write_text(job_text(read_deck(path), JobRequest("m-kg-s", {}), path.name))
+    path.with_suffix(".toml").write_text(job_text(parse_deck(path), DeckOptions("m-kg-s", {}), path.name))
     return path.with_suffix(".toml")
 
 

@@ -10,9 +10,10 @@ from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
 from cms.jobs.body_of_job import coupled_body, uncoupled_body
-from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.model_of_deck import DeckOptions
+from fe_models.files.decks.read_deck import parse_deck
 from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.stages import Stages
 
@@ -48,9 +49,9 @@ def strip():
 def body_of(tmp_path, text, mass, suffix=".bdf"):
     path = tmp_path / f"model{suffix}"
     path.write_text(text if suffix == ".inp" else f"BEGIN BULK\n{text}ENDDATA\n")
-    deck = read_deck(path, program="abaqus") if suffix == ".inp" else read_deck(path)
+    deck = parse_deck(path, program="abaqus") if suffix == ".inp" else parse_deck(path)
     job = path.with_suffix(".toml")
-    job.write_text(job_text(deck, JobRequest("m-kg-s", {}, mass=mass), path.name))
+    job.write_text(job_text(deck, DeckOptions("m-kg-s", {}, mass=mass), path.name))
     made = read_job(job)
     return coupled_body(made, uncoupled_body(made, Stages())), deck
 
@@ -92,8 +93,8 @@ def test_rods_of_abaqus_are_lumped_as_the_deck(tmp_path):
     for mass, expected in ((None, CONSISTENT), ("as the deck", LUMPED), ("lumped", LUMPED)):
         path = tmp_path / "model.inp"
         path.write_text(text)
-        deck = read_deck(path, program="abaqus")
-        path.with_suffix(".toml").write_text(job_text(deck, JobRequest("m-kg-s", {}, mass=mass), path.name))
+        deck = parse_deck(path, program="abaqus")
+        path.with_suffix(".toml").write_text(job_text(deck, DeckOptions("m-kg-s", {}, mass=mass), path.name))
         body = uncoupled_body(read_job(path.with_suffix(".toml")), Stages())
         assert_allclose(axial_frequencies(body), expected, rtol=1e-9)
 

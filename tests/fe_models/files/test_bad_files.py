@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from fe_models import read_mesh
 from fe_models.errors import MeshError
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.read_deck import parse_deck
 from fe_models.files.read_mesh import MESH_FORMATS, read_line_mesh
 from tests.fe_models.small_meshes import faced_box, nastran_deck
 
@@ -556,7 +556,7 @@ def test_a_mesh_of_nastran_is_that_of_the_whole_deck_with_includes_and_coordinat
     assert_allclose(mesh.nodes, [[0, 0, 1], [10, 2, 3], [1, 0, 0], [0, 1, 0]], rtol=0, atol=1e-15 * 10)
     assert mesh.notes == ("BEGIN BULK without ENDDATA at the end: is the file complete?",)
     path.write_text((text + "CORD2R,77\n,1.\nENDDATA\n").replace("CORD2R,77\n,1.", "CORD2R,77,,,,,,,1.\n,1.,,"))
-    deck = read_deck(path).mesh
+    deck = parse_deck(path).mesh
     assert_array_equal(deck.nodes, read_mesh(path).nodes)
     assert_array_equal(deck.blocks[0].nodes, mesh.cells["tetra"])
     assert list(mesh.cell_sets["pid_6"]["tetra"]) == [0]

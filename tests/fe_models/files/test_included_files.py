@@ -5,11 +5,12 @@ from hashlib import sha256
 import pytest
 
 from cms.jobs.body_of_job import uncoupled_body
-from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
 from fe_models import Material, read_mesh, solid_body, unit_system
 from fe_models.errors import MeshError
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.model_of_deck import DeckOptions
+from fe_models.files.decks.read_deck import parse_deck
 from fe_models.files.read_mesh import read_geometry
 from fe_models.foundation.stages import Stages
 
@@ -42,7 +43,7 @@ def test_included_files_are_on_record(tmp_path, name):
     assert read_geometry(path).included == expected
     assert mesh.digest == sha256(path.read_bytes()).hexdigest()
     body = solid_body(mesh, Material("m", E=2e11, nu=0.3, rho=7850.0), name="b", units=unit_system("m-kg-s"))
-    path.with_suffix(".toml").write_text(job_text(read_deck(path), JobRequest("m-kg-s", {}), name))
+    path.with_suffix(".toml").write_text(job_text(parse_deck(path), DeckOptions("m-kg-s", {}), name))
     for made in (body, uncoupled_body(read_job(path.with_suffix(".toml")), Stages())):
         assert {key: value for key, value in made.provenance.items() if key.startswith("file ")} == {
             f"file {each}": digest for each, digest in expected.items()
@@ -54,7 +55,7 @@ def test_what_statements_above_cend_include_may_be_missing(tmp_path):
     grids = "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\n"
     path = tmp_path / "bar.bdf"
     path.write_text(f"SOL 101\nINCLUDE 'dmap.alter'\nCEND\nBEGIN BULK\n{grids}ENDDATA\n")
-    assert len(read_deck(path).mesh.nodes) == 2
+    assert len(parse_deck(path).mesh.nodes) == 2
     path.write_text(f"SOL 101\nCEND\nBEGIN BULK\nINCLUDE 'dmap.alter'\n{grids}ENDDATA\n")
     with pytest.raises(MeshError, match=r"INCLUDE dmap\.alter"):
-        read_deck(path)
+        parse_deck(path)

@@ -16,11 +16,12 @@ from cms.exchange.export import export_body
 from cms.exchange.exporters.nodes import all_nodes
 from cms.exchange.programs.nastran import read_nastran
 from cms.jobs.body_of_job import job_body
-from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
 from fe_models.body.fe_body import Interface
 from fe_models.elements.solids.body import solid_body
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.model_of_deck import DeckOptions
+from fe_models.files.decks.read_deck import parse_deck
 from fe_models.files.read_mesh import read_mesh
 from fe_models.foundation.units import unit_system
 from tests.bodies import STEEL, box_mesh
@@ -78,7 +79,7 @@ def test_numbers_of_a_file_are_those_of_the_body_at_the_same_places(tmp_path, su
 def deck_job(folder, text):
     path = folder / "bar.inp"
     path.write_text(text)
-    path.with_suffix(".toml").write_text(job_text(read_deck(path), JobRequest("m-kg-s", {}), path.name))
+    path.with_suffix(".toml").write_text(job_text(parse_deck(path), DeckOptions("m-kg-s", {}), path.name))
     return path.with_suffix(".toml")
 
 

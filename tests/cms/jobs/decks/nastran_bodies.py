@@ -3,9 +3,10 @@
 import numpy as np
 
 from cms.jobs.body_of_job import coupled_body, uncoupled_body
-from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.model_of_deck import DeckOptions
+from fe_models.files.decks.read_deck import parse_deck
 from fe_models.foundation.stages import Stages
 
 E, NU, RHO = 2e11, 0.3, 7800.0
@@ -18,8 +19,8 @@ SECTION = "PBAR,1,1,2.-3,3.-6,1.-6,2.-6\n"
 def body_of(tmp_path, text, head="BEGIN BULK\n", *, is_coupled=False, **options):
     path = tmp_path / "model.bdf"
     path.write_text(f"{head}{text}\nENDDATA\n")
-    deck = read_deck(path)
-    job = job_text(deck, JobRequest("m-kg-s", {}, **options), path.name)
+    deck = parse_deck(path)
+    job = job_text(deck, DeckOptions("m-kg-s", {}, **options), path.name)
     path.with_suffix(".toml").write_text(job.replace("[body]", '[body]\naccept = ["parts"]'))
     made = read_job(path.with_suffix(".toml"))
     body = uncoupled_body(made, Stages())

@@ -5,9 +5,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from cms.jobs.body_of_job import uncoupled_body
-from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.model_of_deck import DeckOptions
+from fe_models.files.decks.read_deck import parse_deck
 from fe_models.foundation.stages import Stages
 
 DECK = """*NODE
@@ -37,8 +38,8 @@ DECK = """*NODE
 def body_of(folder, **words):
     path = folder / "model.inp"
     path.write_text(DECK.format(**words))
-    deck = read_deck(path)
-    job = job_text(deck, JobRequest("m-kg-s", {}), path.name).replace("[body]", '[body]\naccept = ["parts"]')
+    deck = parse_deck(path)
+    job = job_text(deck, DeckOptions("m-kg-s", {}), path.name).replace("[body]", '[body]\naccept = ["parts"]')
     path.with_suffix(".toml").write_text(job)
     return uncoupled_body(read_job(path.with_suffix(".toml")), Stages()), deck
 
@@ -96,6 +97,6 @@ def test_a_spring_to_the_ground_of_a_turned_instance_holds_along_its_axis(tmp_pa
     turned += "0., 0., 0.\n0., 0., 0., 0., 0., 1., 30.\n*END INSTANCE\n*END ASSEMBLY\n"
     path = tmp_path / "model.inp"
     path.write_text(turned)
-    deck = read_deck(path)
+    deck = parse_deck(path)
     assert [support.components for support in deck.supports] == [(0, 1, 2)]
     assert any("ties ux along axes of its instance of node" in row[2] for row in deck.ledger.rows())

@@ -8,10 +8,11 @@ import scipy.linalg as la
 from numpy.testing import assert_allclose
 
 from cms.jobs.body_of_job import uncoupled_body
-from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
 from fe_models.files.decks.abaqus.keywords import HARMLESS
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.model_of_deck import DeckOptions
+from fe_models.files.decks.read_deck import parse_deck
 from fe_models.foundation.stages import Stages
 
 MATERIAL = "*MATERIAL,NAME=S\n*ELASTIC\n2e11,.3\n*DENSITY\n7850.\n"
@@ -22,8 +23,8 @@ E = 2e11
 def body_of(folder, text, program="abaqus"):
     path = folder / "model.inp"
     path.write_text(text)
-    deck = read_deck(path, program=program)
-    path.with_suffix(".toml").write_text(job_text(deck, JobRequest("m-kg-s", {}), path.name))
+    deck = parse_deck(path, program=program)
+    path.with_suffix(".toml").write_text(job_text(deck, DeckOptions("m-kg-s", {}), path.name))
     return uncoupled_body(read_job(path.with_suffix(".toml")), Stages()), deck
 
 

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from cms.jobs.body_of_job import uncoupled_body
-from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
 from fe_models.files.decks.abaqus.keywords import HARMLESS, PARAMETERS, parameters_of
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.model_of_deck import DeckOptions
+from fe_models.files.decks.read_deck import parse_deck
 from fe_models.foundation.stages import Stages
 
 DECK = """*NODE, NSET=most
@@ -141,9 +142,9 @@ def model_of(folder, text):
     path = folder / "model.inp"
     path.write_text(text)
     try:
-        deck = read_deck(path)
+        deck = parse_deck(path)
         path.with_suffix(".toml").write_text(
-            job_text(deck, JobRequest("m-kg-s", {}), path.name).replace(
+            job_text(deck, DeckOptions("m-kg-s", {}), path.name).replace(
                 "[body]", '[body]\naccept = ["parts", "left-out"]'
             )
         )
@@ -218,7 +219,7 @@ def refusal_of(folder, text):
     path = folder / "model.inp"
     path.write_text(text)
     try:
-        return "; ".join(entry.name for entry in read_deck(path).ledger.entries.values() if entry.is_body)
+        return "; ".join(entry.name for entry in parse_deck(path).ledger.entries.values() if entry.is_body)
     except ValueError as error:
         return str(error)
 

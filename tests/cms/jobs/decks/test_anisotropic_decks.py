@@ -6,12 +6,13 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from cms.jobs.body_of_job import uncoupled_body
-from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
 from fe_models.body.material import AnisotropicMaterial, OrthotropicMaterial
 from fe_models.elements.solids.body import solid_body
 from fe_models.errors import MeshError
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.model_of_deck import DeckOptions
+from fe_models.files.decks.read_deck import parse_deck
 from fe_models.foundation.stages import Stages
 from tests.bodies import box_mesh
 from tests.decks import write_deck
@@ -23,7 +24,7 @@ ANISOTROPIC = [f"{i}{j}" for j in range(1, 7) for i in range(1, j + 1)]
 
 
 def body_of(path):
-    text = job_text(read_deck(path), JobRequest("m-kg-s", {}), path.name)
+    text = job_text(parse_deck(path), DeckOptions("m-kg-s", {}), path.name)
     path.with_suffix(".toml").write_text(text)
     return uncoupled_body(read_job(path.with_suffix(".toml")), Stages())
 
@@ -74,10 +75,10 @@ def test_axes_that_are_not_known_are_refused(tmp_path):
     with pytest.raises(MeshError, match=r"1 \*ORIENTATION: axes that vary in space"):
         body_of(deck(tmp_path, "ORTHOTROPIC", around))
     with pytest.raises(MeshError, match="a section names the orientation 'Grain'"):
-        read_deck(deck(tmp_path, "ORTHOTROPIC", "*ORIENTATION, NAME=OTHER\n1., 0., 0., 0., 1., 0.\n"))
+        parse_deck(deck(tmp_path, "ORTHOTROPIC", "*ORIENTATION, NAME=OTHER\n1., 0., 0., 0., 1., 0.\n"))
     line = "*ORIENTATION, NAME=GRAIN\n1., 0., 0., 2., 0., 0.\n"
     with pytest.raises(MeshError, match="points a and b lie on one line"):
-        read_deck(deck(tmp_path, "ORTHOTROPIC", line))
+        parse_deck(deck(tmp_path, "ORTHOTROPIC", line))
 
 
 def coupled(folder, value):
@@ -152,7 +153,7 @@ def test_thickness_at_nodes_keeps_the_mass_of_a_quadratic_thickness(tmp_path):
     rows = "".join(f"{node}, {0.01 * (1 + at + at**2)!r}\n" for node, at in x.items())
     path = tmp_path / "plate.inp"
     path.write_text(PLATE + "*NODAL THICKNESS\nedge, 0.21\n" + rows)
-    loaded = read_deck(path)
+    loaded = parse_deck(path)
     assert ("*NODAL THICKNESS", "2") in [row[:2] for row in loaded.ledger.rows()]
     for shell in loaded.shells:
         assert_allclose(shell.offset, -shell.thickness / 2, rtol=1e-14)

@@ -6,10 +6,11 @@ import scipy.linalg as la
 from numpy.testing import assert_allclose, assert_array_equal
 
 from cms.jobs.body_of_job import uncoupled_body
-from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
 from fe_models.errors import MeshError
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.model_of_deck import DeckOptions
+from fe_models.files.decks.read_deck import parse_deck
 from fe_models.foundation.stages import Stages
 from tests.root import ROOT
 
@@ -29,7 +30,7 @@ def deck_of(folder, text):
 
 
 def body_of(path, units="in-slinch-s"):
-    text = job_text(read_deck(path), JobRequest(units, {}), path.name)
+    text = job_text(parse_deck(path), DeckOptions(units, {}), path.name)
     path.with_suffix(".toml").write_text(text)
     return uncoupled_body(read_job(path.with_suffix(".toml")), Stages())
 
@@ -53,7 +54,7 @@ def test_stiffness_and_mass_of_solid186_are_those_of_ansys(tmp_path):
 
 
 def test_nodes_elements_components_and_materials_are_read(tmp_path):
-    deck = read_deck(deck_of(tmp_path, beam_text() + "D,2,UX,0.\nD,4,ALL,0.\nF,1,FY,3.5\n"))
+    deck = parse_deck(deck_of(tmp_path, beam_text() + "D,2,UX,0.\nD,4,ALL,0.\nF,1,FY,3.5\n"))
     assert (len(deck.mesh.nodes), len(deck.mesh.blocks[0].nodes)) == (321, 40)
     assert_array_equal(deck.mesh.nodes[[0, 1]], [[0, 0, 0], [1, 0, 0]])  # zeros at the end are left out
     numbers = deck.mesh.node_numbers[deck.mesh.node_sets["NCOMP2"]]
@@ -80,7 +81,7 @@ def test_nodes_elements_components_and_materials_are_read(tmp_path):
 def test_damaged_files_are_refused(tmp_path, old, new, words):
     assert old in beam_text()
     with pytest.raises(MeshError, match=words):
-        read_deck(deck_of(tmp_path, beam_text().replace(old, new)))
+        parse_deck(deck_of(tmp_path, beam_text().replace(old, new)))
 
 
 @pytest.mark.parametrize(
@@ -96,7 +97,7 @@ def test_damaged_files_are_refused(tmp_path, old, new, words):
 def test_mass_and_stiffness_are_never_left_out_unasked(tmp_path, old, new, words):
     assert old in beam_text()
     with pytest.raises(MeshError, match=words):
-        read_deck(deck_of(tmp_path, beam_text().replace(old, new, 1))).ledger.require_whole()
+        parse_deck(deck_of(tmp_path, beam_text().replace(old, new, 1))).ledger.require_whole()
 
 
 CUBE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
@@ -160,7 +161,7 @@ def test_solid187_without_middle_nodes_is_a_tetrahedron_of_first_order(tmp_path)
     assert_allclose(K[1], K[0], rtol=1e-12, atol=1e-12 * K[0].max())
     path.write_text(text.replace(four, four.replace(f"{4:9d}{0:9d}{1:9d}", f"{5:9d}{0:9d}{1:9d}") + f"{6:9d}"))
     with pytest.raises(MeshError, match=r"\(SOLID187\) has 5 nodes; expected 4 or 10"):
-        read_deck(path)
+        parse_deck(path)
 
 
 def test_tables_over_temperature_are_taken_at_the_first_one(tmp_path):
@@ -172,7 +173,7 @@ def test_tables_over_temperature_are_taken_at_the_first_one(tmp_path):
         "MPDATA,R5.0, 2,EX , 1, 4, 1.0e11, 0.9e11\n",
     )
     assert table != STEEL
-    deck = read_deck(cube(tmp_path, materials=table))
+    deck = parse_deck(cube(tmp_path, materials=table))
     assert deck.materials["1"].young == 2e11
     assert ("MPDATA, EX", "1", "material 1 depends on temperature, 5 values: the first is taken") in deck.ledger.rows()
 
@@ -199,7 +200,7 @@ def test_orthotropic_constants_are_those_of_the_compliance_of_ansys(tmp_path):
     expected = expected + np.triu(expected, 1).T
     assert_allclose(S, expected, rtol=1e-9)
     with pytest.raises(MeshError, match="along element system 11"):
-        read_deck(cube(tmp_path, materials=words, esys=11)).ledger.require_whole()
+        parse_deck(cube(tmp_path, materials=words, esys=11)).ledger.require_whole()
 
 
 def test_keyopt_2_of_solid186_is_full_integration(tmp_path):
@@ -213,6 +214,6 @@ def test_keyopt_2_of_solid186_is_full_integration(tmp_path):
 
 def test_damping_of_a_deck_is_named(tmp_path):
     words = STEEL + "MP,DMPR,1,.02\nALPHAD,3.5\nBETAD,1.0e-5\nDMPRAT,0.\n"
-    rows = read_deck(cube(tmp_path, materials=words)).ledger.rows()
+    rows = parse_deck(cube(tmp_path, materials=words)).ledger.rows()
     assert ("ALPHAD", "1", "damping (VALUE = 3.5) is left out: give the job a table [damping]") in rows
     assert {row[0] for row in rows if "damping" in row[2]} == {"ALPHAD", "BETAD", "MPDATA, DMPR"}

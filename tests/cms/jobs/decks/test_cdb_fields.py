@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from cms.jobs.body_of_job import uncoupled_body
-from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
 from fe_models.files.decks.ansys.command_fields import COLUMNS, COMMANDS, HARMLESS, fields_of_command
 from fe_models.files.decks.field_table import parse_fields
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.model_of_deck import DeckOptions
+from fe_models.files.decks.read_deck import parse_deck
 from fe_models.foundation.stages import Stages
 
 CORNERS = [(0, 0, 0), (2, 0, 0.1), (2.1, 1, 0), (0, 1.2, 0), (0.1, 0, 1), (2, 0.1, 1), (2, 1, 1.1), (0, 1, 1)]
@@ -63,8 +64,8 @@ def model_of(folder, commands=COMMANDS_OF_CUBE, columns=None):
     """Return what a file makes, as arrays; or the refusal."""
     path = cube(folder, commands, columns)
     try:
-        deck = read_deck(path)
-        path.with_suffix(".toml").write_text(job_text(deck, JobRequest("m-kg-s", {}), path.name))
+        deck = parse_deck(path)
+        path.with_suffix(".toml").write_text(job_text(deck, DeckOptions("m-kg-s", {}), path.name))
         body = uncoupled_body(read_job(path.with_suffix(".toml")), Stages())
     except ValueError as error:
         return str(error)

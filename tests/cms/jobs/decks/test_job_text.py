@@ -7,13 +7,16 @@ from scipy.linalg import eigh
 from typer.testing import CliRunner
 
 import cms
+import fe_models
 from cms.cli.app import app
 from cms.errors import BodyError, JobError
 from cms.jobs.body_of_job import job_body, uncoupled_body
-from cms.jobs.decks.job_text import JobRequest, job_text
-from cms.jobs.job import read_job
+from cms.jobs.decks.job_text import job_text
+from cms.jobs.job import ReductionSection, read_job
 from fe_models.elements.solids.body import solid_body
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.errors import MeshError
+from fe_models.files.decks.model_of_deck import DeckOptions
+from fe_models.files.decks.read_deck import parse_deck
 from fe_models.foundation.stages import Stages
 from tests.bodies import STEEL, box_mesh
 from tests.decks import write_deck
@@ -29,7 +32,7 @@ def deck_of(folder, extra="", kind="hexahedron20", counts=(4, 1, 1), head=""):
 
 
 def job_of(path, **options):
-    text = job_text(read_deck(path), JobRequest("m-kg-s", **{"densities": {}, **options}), path.name)
+    text = job_text(parse_deck(path), DeckOptions("m-kg-s", **{"densities": {}, **options}), path.name)
     path.with_suffix(".toml").write_text(text)
     return read_job(path.with_suffix(".toml"))
 
@@ -66,6 +69,58 @@ def test_masses_rigid_groups_and_loads_of_a_deck_are_in_the_body(tmp_path):
     assert_allclose(body.nodes[leader], [1.2, 0.05, 0.04], rtol=1e-14)
 
 
+#: supports, a mass on a rigid group, a load of each kind
+WHOLE = (
+    "*BOUNDARY\nleft, 1, 3\n*NODE\n900, 1.2, 0.05, 0.04\n*ELEMENT, TYPE=MASS, ELSET=tip\n900, 900\n"
+    "*MASS, ELSET=tip\n5.\n*RIGID BODY, NSET=right, REF NODE=900\n*STEP\n*STATIC\n*CLOAD\n900, 3, -2.\n"
+    "*DLOAD\nall, P3, 4.\nall, GRAV, 9.81, 0., -1., 0.\n*END STEP\n"
+)
+
+
+def test_a_deck_read_in_python_is_the_body_of_its_job(tmp_path):
+    path = deck_of(tmp_path, WHOLE, kind="hexahedron")
+    body = fe_models.couple(fe_models.assemble(fe_models.read_deck(path, units="m-kg-s")))
+    expected = job_body(job_of(path))
+    for A, B in ((body.M, expected.M), (body.K, expected.K)):
+        assert_array_equal(A.toarray(), B.toarray())
+    assert_array_equal(body.dofs, expected.dofs)
+    assert [each.name for each in body.interfaces] == [each.name for each in expected.interfaces] == ["left"]
+    for case, other in zip(body.load_cases, expected.load_cases, strict=True):
+        assert (case.name, case.kind) == (other.name, other.kind)
+        assert_array_equal(case.f, other.f)
+
+
+@pytest.mark.parametrize("reduction", [None, {"set": "rubin", "n_modes": 3}])
+def test_a_deck_is_reduced_as_its_job(tmp_path, reduction):
+    path = deck_of(tmp_path, WHOLE, kind="hexahedron")
+    reduced = cms.reduce_deck(path, units="m-kg-s", reduction=reduction)
+    job = job_of(path)
+    if reduction is not None:
+        job = job.model_copy(update={"reduction": ReductionSection.model_validate(reduction)})
+    expected = cms.reduce_job(job)
+    for name in ("M", "K", "Phi"):
+        assert_array_equal(getattr(reduced, name), getattr(expected, name))
+
+
+def test_a_model_names_the_key_that_is_wrong(tmp_path):
+    path = deck_of(tmp_path, kind="hexahedron")
+    path.write_text(path.read_text().replace("*DENSITY\n7850.\n", ""))
+    with pytest.raises(MeshError, match="1 materials have no density"):
+        fe_models.read_deck(path, units="m-kg-s")
+    steel = {"young": 2e11, "poisson": 0.3, "density": 7800.0}
+    given = {"units": "m-kg-s", "materials": {"steel": steel}, "solids": {"all": {"cells": "all"}}}
+    for change, words in (
+        (
+            {"solids": {"all": {"material": "tin"}}},
+            r'model .bar.: solids\.all\.material = "tin": there is no such material',
+        ),
+        ({"materials": {"steel": {**steel, "young": -1}}}, r"materials\.steel\.young = -1: expected a number above 0"),
+        ({"plane": "xx"}, "plane: unknown 'xx'; choices: xy"),
+    ):
+        with pytest.raises(BodyError, match=words):
+            fe_models.FEModel.of("bar", parse_deck(path).mesh, **(given | change))
+
+
 def test_a_mass_of_a_deck_names_its_node_by_number(tmp_path):
     """The number of a node of this deck is its row plus one."""
     path = deck_of(tmp_path, "*NSET, NSET=tip\n7\n", kind="hexahedron")
@@ -92,10 +147,10 @@ def test_pressure_of_a_deck_has_the_resultant_of_its_faces(tmp_path):
 def test_what_a_deck_lacks_is_asked_for(tmp_path):
     path = deck_of(tmp_path)
     path.write_text(path.read_text().replace("*DENSITY\n7850.\n", ""))
-    with pytest.raises(JobError, match="1 materials have no density: STEEL; give it, as --density STEEL="):
+    with pytest.raises(MeshError, match="1 materials have no density: STEEL; give it, as --density STEEL="):
         job_of(path)
     assert job_of(path, densities={"STEEL": 8000.0}).materials["STEEL"].density == 8000.0
-    with pytest.raises(JobError, match="--density 'STEAL': the deck has no such material in use; did you mean"):
+    with pytest.raises(MeshError, match="--density 'STEAL': the deck has no such material in use; did you mean"):
         job_of(path, densities={"STEAL": 8000.0})
 
 

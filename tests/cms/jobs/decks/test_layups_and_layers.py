@@ -5,13 +5,14 @@ import pytest
 from numpy.testing import assert_allclose
 
 from cms.jobs.body_of_job import uncoupled_body
-from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
 from fe_models.body.material import Material, OrthotropicMaterial
 from fe_models.elements.shells.body import shell_body
 from fe_models.elements.shells.shell_property import LaminateProperty, Layer
 from fe_models.errors import MeshError
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.model_of_deck import DeckOptions
+from fe_models.files.decks.read_deck import parse_deck
 from fe_models.foundation.stages import Stages
 from fe_models.meshes.shell_mesh import ShellMesh
 
@@ -49,7 +50,7 @@ PLY = OrthotropicMaterial("Ply", (1.4e11, 1e10, 1e10), (5e9, 5e9, 3e9), (0.3, 0.
 def body_of(folder, text):
     path = folder / "plate.inp"
     path.write_text(text)
-    path.with_suffix(".toml").write_text(job_text(read_deck(path), JobRequest("m-kg-s", {}), path.name))
+    path.with_suffix(".toml").write_text(job_text(parse_deck(path), DeckOptions("m-kg-s", {}), path.name))
     return uncoupled_body(read_job(path.with_suffix(".toml")), Stages())
 
 

@@ -9,9 +9,10 @@ from numpy.testing import assert_allclose
 from scipy.linalg import block_diag, eigh
 
 from cms.jobs.body_of_job import job_body, uncoupled_body
-from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.model_of_deck import DeckOptions
+from fe_models.files.decks.read_deck import parse_deck
 from fe_models.files.nastran_matrices.superelement import read_superelement
 from fe_models.foundation.stages import Stages
 from tests.root import ROOT
@@ -21,7 +22,7 @@ HEAD = "SOL 103\nCEND\nMETHOD=1\nBEGIN BULK\nBSET1,123456,3,11,19,27\ninclude 'o
 
 
 def job_of(path: Path, units="m-kg-s", **options):
-    text = job_text(read_deck(path), JobRequest(units, **{"densities": {}, **options}), path.name)
+    text = job_text(parse_deck(path), DeckOptions(units, **{"densities": {}, **options}), path.name)
     path.with_suffix(".toml").write_text(text)
     return read_job(path.with_suffix(".toml"))
 
@@ -90,7 +91,7 @@ def deck_of(folder, text=DECK):
 
 
 def test_a_deck_of_nastran_is_read_whole(tmp_path):
-    deck = read_deck(deck_of(tmp_path, DECK.replace("CELAS2,70,5.+3,1,2,2,2\n", "")))
+    deck = parse_deck(deck_of(tmp_path, DECK.replace("CELAS2,70,5.+3,1,2,2,2\n", "")))
     deck.ledger.require_whole()
     assert_allclose(deck.mesh.nodes[0], [10, 0, 0], atol=1e-14)
     assert deck.materials["9"].density == 2 * 7850.0
@@ -141,14 +142,14 @@ def test_a_spring_between_held_components_is_left_out_with_a_note(tmp_path):
 )  # fmt: skip
 def test_cards_with_mass_or_stiffness_are_refused_by_name(tmp_path, old, new, words):
     assert old in DECK
-    deck = read_deck(deck_of(tmp_path, DECK.replace(old, new)))
+    deck = parse_deck(deck_of(tmp_path, DECK.replace(old, new)))
     with pytest.raises(ValueError, match=words):
         deck.ledger.require_whole()
 
 
 def test_a_mean_motion_of_no_grids_is_refused(tmp_path):
     with pytest.raises(ValueError, match="expected weights, components and grids, got none"):
-        read_deck(deck_of(tmp_path, DECK.replace("RBE2,60,9,123456,5,6,7,8", "RBE3,60,,9,123456")))
+        parse_deck(deck_of(tmp_path, DECK.replace("RBE2,60,9,123456,5,6,7,8", "RBE3,60,,9,123456")))
 
 
 @pytest.mark.parametrize(
@@ -162,7 +163,7 @@ def test_a_mean_motion_of_no_grids_is_refused(tmp_path):
 )
 def test_a_bush_says_whose_axes_it_takes_unasked(tmp_path, bush, axes):
     lines = f"GRID,10,,0.,0.,1.\n{bush}\nPBUSH,71,K,1.,2.,3."
-    deck = read_deck(deck_of(tmp_path, DECK.replace("CELAS2,70,5.+3,1,2,2,2", lines)))
+    deck = parse_deck(deck_of(tmp_path, DECK.replace("CELAS2,70,5.+3,1,2,2,2", lines)))
     deck.ledger.require_whole()
     assert len(deck.springs) == 1
     told = [why for name, _, why in deck.ledger.rows() if name == "CBUSH"]
@@ -175,7 +176,7 @@ def test_axes_of_a_bush_lie_along_it_and_towards_its_orientation(tmp_path, orien
     """From (1, 2, 3) to (3, 5, 9), off the origin: x is (2, 3, 6)/7, z is normal to x and the orientation."""
     grids = "GRID,10,,1.,2.,3.\nGRID,11,,3.,5.,9.\nGRID,12,,3.,1.,3.5\n"
     lines = f"{grids}CBUSH,70,71,10,11,{orientation}\nPBUSH,71,K,1.,2.,3.,4.,5.,6."
-    deck = read_deck(deck_of(tmp_path, DECK.replace("CELAS2,70,5.+3,1,2,2,2", lines)))
+    deck = parse_deck(deck_of(tmp_path, DECK.replace("CELAS2,70,5.+3,1,2,2,2", lines)))
     x = np.array([2, 3, 6]) / 7
     z = np.cross(x, [2, -1, 0.5])
     z /= np.linalg.norm(z)
@@ -194,7 +195,7 @@ def test_axes_of_a_bush_lie_along_it_and_towards_its_orientation(tmp_path, orien
 def test_a_bush_with_length_needs_axes_unless_it_is_round(tmp_path, law, is_round):
     """Round: the same along its y and z, and about them; whatever acts along and about its line."""
     bush = f"GRID,10,,7.,.5,1.\nCBUSH,70,71,5,10\nPBUSH,71,{law}"
-    deck = read_deck(deck_of(tmp_path, DECK.replace("CELAS2,70,5.+3,1,2,2,2", bush)))
+    deck = parse_deck(deck_of(tmp_path, DECK.replace("CELAS2,70,5.+3,1,2,2,2", bush)))
     told = [why for name, _, why in deck.ledger.rows() if name == "CBUSH" and "with length, other values" in why]
     assert bool(told) != is_round, deck.ledger.rows()
 
@@ -203,10 +204,10 @@ def test_a_missing_include_and_a_ring_of_them_are_refused(tmp_path):
     path = deck_of(tmp_path)
     (tmp_path / "nodes.bulk").write_text("INCLUDE 'nodes.bulk'\n")
     with pytest.raises(ValueError, match=r"INCLUDE nodes\.bulk: includes itself"):
-        read_deck(path)
+        parse_deck(path)
     (tmp_path / "nodes.bulk").unlink()
     with pytest.raises(ValueError, match=r"INCLUDE nodes.bulk: .* cannot be read: No such file"):
-        read_deck(path)
+        parse_deck(path)
 
 
 def test_rods_are_axial_springs_with_half_of_their_mass_at_each_end(tmp_path):
@@ -239,7 +240,7 @@ def test_rbe3_with_weights_of_components_is_the_weighted_motion_of_its_grids(tmp
     cards += [f"GRID,{k},,{x},{y},{z}" for k, (x, y, z) in enumerate(points, start=1)]
     path = tmp_path / "plate.bdf"
     path.write_text("\n".join(cards) + "\n")
-    deck = read_deck(path)
+    deck = parse_deck(path)
     deck.ledger.require_whole()
     coupling = deck.couplings[0]
     assert coupling.components == (0, 1, 2, 4, 5)
@@ -282,7 +283,7 @@ def test_weights_and_components_of_an_rbe3_are_along_the_axes_of_their_points(tm
     cards += [f"GRID,{k + 1},,{x},{y},{z},{(7, 8, '', 7)[k]}" for k, (x, y, z) in enumerate(points)]
     path = tmp_path / "plate.bdf"
     path.write_text("\n".join(cards) + "\n")
-    deck = read_deck(path)
+    deck = parse_deck(path)
     deck.ledger.require_whole()
     seven = np.array([[1, 0, 0], [0, 0.8, -0.6], [0, 0.6, 0.8]])
     eight = np.array([[1, -1, 0], [1, 1, -4], [2, 2, 1]]) / np.sqrt([[2], [18], [9]])
@@ -317,13 +318,13 @@ def test_weights_and_components_of_an_rbe3_are_along_the_axes_of_their_points(tm
 def test_an_rbe3_without_weight_and_components_is_refused(tmp_path, words):
     deck = DECK.replace("RBE2,60,9,123456,5,6,7,8", f"RBE3,60,,9,123456,{words}")
     with pytest.raises(ValueError, match="RBE3 60: expected a weight and components"):
-        read_deck(deck_of(tmp_path, deck))
+        parse_deck(deck_of(tmp_path, deck))
 
 
 @pytest.mark.parametrize("weight", ["[1.0, 2.0]", "true", '"1"', "[1, 1, 1, 0, 0, nan]"])
 def test_a_weight_of_a_coupling_is_a_number_or_six(tmp_path, weight):
     path = deck_of(tmp_path, DECK.replace("RBE2,60,9,123456,5,6,7,8", "RBE3,60,,9,123456,1.,123,5,6\n,7,8"))
-    text = job_text(read_deck(path), JobRequest("m-kg-s", {}), path.name)
+    text = job_text(parse_deck(path), DeckOptions("m-kg-s", {}), path.name)
     job = path.with_suffix(".toml")
     job.write_text(text.replace("rbe3_60_nodes_1 = 1.0", f"rbe3_60_nodes_1 = {weight}"))
     with pytest.raises(ValueError, match="expected a number, or a list of six"):
@@ -371,11 +372,11 @@ def test_pressure_on_a_face_of_a_solid_pushes_with_its_area(tmp_path, card, pair
     ],
 )
 def test_pressure_that_no_load_case_has_is_counted(tmp_path, load, words):
-    deck = read_deck(deck_of(tmp_path, DECK + load + "\n"))
+    deck = parse_deck(deck_of(tmp_path, DECK + load + "\n"))
     assert [name for name in (load.name for load in deck.loads) if "pressure" in name] == []
     assert any(name == "PLOAD4" and words in why for name, _, why in deck.ledger.rows())
 
 
 def test_a_face_that_the_element_has_not_is_refused(tmp_path):
     with pytest.raises(ValueError, match="element 1 has no face of the grid points 5 and 6"):
-        read_deck(deck_of(tmp_path, DECK + "PLOAD4,5,1,10.,,,,5,6\n"))
+        parse_deck(deck_of(tmp_path, DECK + "PLOAD4,5,1,10.,,,,5,6\n"))

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from cms.jobs.body_of_job import uncoupled_body
-from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
+from fe_models.files.decks.model_of_deck import DeckOptions
 from fe_models.files.decks.nastran.card_fields import CARDS, HARMLESS, fields_of
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.read_deck import parse_deck
 from fe_models.foundation.stages import Stages
 
 GRIDS = "\n".join(
@@ -268,8 +269,8 @@ def model_of(tmp_path, text):
     path = tmp_path / "model.bdf"
     path.write_text(f"BEGIN BULK\n{COMMON}{GRIDS}\n{text}\nENDDATA\n")
     try:
-        deck = read_deck(path)
-        path.with_suffix(".toml").write_text(job_text(deck, JobRequest("m-kg-s", {}), path.name))
+        deck = parse_deck(path)
+        path.with_suffix(".toml").write_text(job_text(deck, DeckOptions("m-kg-s", {}), path.name))
         body = uncoupled_body(read_job(path.with_suffix(".toml")), Stages())
     except ValueError as error:
         return str(error)

@@ -5,13 +5,14 @@ import pytest
 from numpy.testing import assert_allclose
 
 from cms.jobs.body_of_job import uncoupled_body
-from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
 from fe_models.body.material import Material, OrthotropicMaterial
 from fe_models.elements.shells.body import shell_body
 from fe_models.elements.shells.shell_property import LaminateProperty, Layer
 from fe_models.errors import MeshError
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.model_of_deck import DeckOptions
+from fe_models.files.decks.read_deck import parse_deck
 from fe_models.foundation.stages import Stages
 from fe_models.meshes.shell_mesh import ShellMesh
 
@@ -41,7 +42,7 @@ def deck_of(folder, theta="", z0="", lam="", **more):
         text = text.replace(old, new)
     path = folder / "plate.bdf"
     path.write_text(text)
-    return read_deck(path)
+    return parse_deck(path)
 
 
 @pytest.mark.parametrize(
@@ -55,7 +56,7 @@ def deck_of(folder, theta="", z0="", lam="", **more):
 def test_layers_lie_as_the_card_says(tmp_path, options, direction, offset, repeat):
     deck = deck_of(tmp_path, **options)
     path = tmp_path / "plate.toml"
-    path.write_text(job_text(deck, JobRequest("m-kg-s", {}), "plate.bdf"))
+    path.write_text(job_text(deck, DeckOptions("m-kg-s", {}), "plate.bdf"))
     body = uncoupled_body(read_job(path), Stages())
     layers = (Layer(STEEL, 0.01), Layer(PLY, 0.02, 30.0), Layer(PLY, 0.02, -45.0))
     layers = layers if repeat == 1 else layers + layers[::-1]
@@ -69,7 +70,7 @@ def test_layers_lie_as_the_card_says(tmp_path, options, direction, offset, repea
 def test_a_last_layer_that_is_given_by_its_material_alone_takes_the_thickness_before_it(tmp_path):
     deck = deck_of(tmp_path, **{",2,,-45.": ",2"})
     path = tmp_path / "plate.toml"
-    path.write_text(job_text(deck, JobRequest("m-kg-s", {}), "plate.bdf"))
+    path.write_text(job_text(deck, DeckOptions("m-kg-s", {}), "plate.bdf"))
     body = uncoupled_body(read_job(path), Stages())
     along = (body.dofs[:, 1] == 0).astype(float)
     density = 0.01 * 8000.0 + 2 * 0.02 * 1600.0 + 2.0

@@ -5,14 +5,15 @@ import pytest
 from numpy.testing import assert_allclose
 
 from cms.jobs.body_of_job import uncoupled_body
-from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
 from fe_models.body.material import OrthotropicMaterial
 from fe_models.elements.shells.body import shell_body
 from fe_models.elements.shells.laminate import shell_law
 from fe_models.elements.shells.shell_property import LaminateProperty, Layer, StiffnessProperty
 from fe_models.errors import MeshError
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.model_of_deck import DeckOptions
+from fe_models.files.decks.read_deck import parse_deck
 from fe_models.foundation.stages import Stages
 from fe_models.foundation.units import unit_system
 from fe_models.meshes.shell_mesh import ShellMesh
@@ -65,8 +66,8 @@ def deck_text(H, bending_ratio=1.0, sign=-1.0, mid4="14", theta="0."):
 
 def body_of(folder, text):
     (folder / "plate.bdf").write_text(text)
-    deck = read_deck(folder / "plate.bdf")
-    (folder / "plate.toml").write_text(job_text(deck, JobRequest("m-kg-s", {}), "plate.bdf"))
+    deck = parse_deck(folder / "plate.bdf")
+    (folder / "plate.toml").write_text(job_text(deck, DeckOptions("m-kg-s", {}), "plate.bdf"))
     return uncoupled_body(read_job(folder / "plate.toml"), Stages())
 
 

@@ -3,12 +3,14 @@
 import pytest
 from numpy.testing import assert_allclose
 
-from cms.errors import BodyError, JobError
+from cms.errors import BodyError
 from cms.jobs.body_of_job import uncoupled_body
-from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
 from fe_models import read_mesh
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.errors import MeshError
+from fe_models.files.decks.model_of_deck import DeckOptions
+from fe_models.files.decks.read_deck import parse_deck
 from fe_models.foundation.stages import Stages
 from tests.bodies import box_mesh
 from tests.decks import write_deck
@@ -57,21 +59,21 @@ def test_a_plain_mesh_says_in_one_line_what_only_names_groups(path):
 
 
 def test_a_plain_mesh_is_no_deck_and_the_message_says_how_to_use_it(path):
-    deck = read_deck(path)
+    deck = parse_deck(path)
     assert deck.is_plain_mesh
     assert deck.ledger.rows() == [("*ELEMENT", "1", LINE)]
-    with pytest.raises(JobError, match="a plain mesh, without materials, sections and steps") as caught:
-        job_text(deck, JobRequest("m-kg-s", {}), path.name)
+    with pytest.raises(MeshError, match="a plain mesh, without materials, sections and steps") as caught:
+        job_text(deck, DeckOptions("m-kg-s", {}), path.name)
     assert "[body] mesh = 'bar.inp'" in str(caught.value)
     assert "'Surface1'" in str(caught.value)
     path.write_text(path.read_text() + "*NSET, NSET=foot\n1, 2\n")
-    with pytest.raises(JobError, match=r"its sets of nodes .*'foot'"):
-        job_text(read_deck(path), JobRequest("m-kg-s", {}), path.name)
+    with pytest.raises(MeshError, match=r"its sets of nodes .*'foot'"):
+        job_text(parse_deck(path), DeckOptions("m-kg-s", {}), path.name)
     for more in ("*MATERIAL, NAME=M\n", "*STEP\n*FREQUENCY\n2\n*END STEP\n"):
         path.write_text(path.read_text() + more)
-        assert not read_deck(path).is_plain_mesh
+        assert not parse_deck(path).is_plain_mesh
         with pytest.raises(ValueError, match="elements without a section"):
-            job_text(read_deck(path), JobRequest("m-kg-s", {}), path.name)
+            job_text(parse_deck(path), DeckOptions("m-kg-s", {}), path.name)
 
 
 def test_a_job_of_its_own_tables_reads_a_plain_mesh_as_mesh_and_as_deck(path):

@@ -6,9 +6,10 @@ from numpy.testing import assert_allclose
 from scipy.linalg import eigh
 
 from cms.jobs.body_of_job import coupled_body, uncoupled_body
-from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.model_of_deck import DeckOptions
+from fe_models.files.decks.read_deck import parse_deck
 from fe_models.foundation.stages import Stages
 
 E, NU, RHO, T = 2e11, 0.3, 7800.0, 0.02
@@ -20,8 +21,8 @@ C = E / (1 - NU**2) * np.array([[1, NU, 0], [NU, 1, 0], [0, 0, (1 - NU) / 2]])
 
 
 def made(path, **options):
-    deck = read_deck(path)
-    text = job_text(deck, JobRequest("m-kg-s", {}, **options), path.name)
+    deck = parse_deck(path)
+    text = job_text(deck, DeckOptions("m-kg-s", {}, **options), path.name)
     path.with_suffix(".toml").write_text(text.replace("[body]", '[body]\naccept = ["parts"]'))
     job = read_job(path.with_suffix(".toml"))
     return coupled_body(job, uncoupled_body(job, Stages())), deck

@@ -6,12 +6,13 @@ from numpy.testing import assert_allclose
 from scipy.linalg import eigh
 
 from cms.jobs.body_of_job import uncoupled_body
-from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
 from fe_models.assembly.rods import Rod, rod_body
 from fe_models.body.material import Material
 from fe_models.errors import MeshError
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.model_of_deck import DeckOptions
+from fe_models.files.decks.read_deck import parse_deck
 from fe_models.foundation.errors import BodyError
 from fe_models.foundation.stages import Stages
 from fe_models.foundation.units import unit_system
@@ -72,7 +73,7 @@ def test_a_truss_of_a_deck_has_the_stiffness_of_its_triangle(tmp_path):
     """Two rods of length 5: at the top 2 EA/L times 0.36 and 0.64, nothing across; mass 2 (1/3) rho A L."""
     path = tmp_path / "truss.inp"
     path.write_text(TRUSS)
-    path.with_suffix(".toml").write_text(job_text(read_deck(path), JobRequest("m-kg-s", {}), path.name))
+    path.with_suffix(".toml").write_text(job_text(parse_deck(path), DeckOptions("m-kg-s", {}), path.name))
     body = uncoupled_body(read_job(path.with_suffix(".toml")), Stages())
     top = [int(np.flatnonzero((body.dofs[:, 1] == c) & (body.nodes[body.dofs[:, 0], 2] == 4))[0]) for c in range(3)]
     EA_L = 2e11 * 3e-4 / 5
@@ -81,4 +82,4 @@ def test_a_truss_of_a_deck_has_the_stiffness_of_its_triangle(tmp_path):
     assert len(body.dofs) == 9
     path.write_text(TRUSS.replace("T3D2", "T3D3").replace("1, 1, 2\n2, 2, 3", "1, 1, 2, 3"))
     with pytest.raises(MeshError, match="T3D3"):
-        read_deck(path).ledger.require_whole()
+        parse_deck(path).ledger.require_whole()

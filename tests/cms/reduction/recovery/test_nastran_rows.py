@@ -12,10 +12,11 @@ from numpy.testing import assert_allclose
 import cms
 from cms.exchange.importers.element_rows import force_rows
 from cms.jobs.body_of_job import uncoupled_body
-from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
 from fe_models.body.fe_body import Interface
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.model_of_deck import DeckOptions
+from fe_models.files.decks.read_deck import parse_deck
 from fe_models.files.nastran_matrices.superelement import read_superelement
 from fe_models.foundation.stages import Stages
 from tests.root import ROOT
@@ -44,7 +45,7 @@ def frame(tmp_path_factory) -> cms.FEBody:
     (folder / "outboard.blk").write_bytes((DATA / "outboard.blk").read_bytes())
     deck = folder / "frame.dat"
     deck.write_text(HEAD)
-    deck.with_suffix(".toml").write_text(job_text(read_deck(deck), JobRequest("mm-kg-s", densities={}), deck.name))
+    deck.with_suffix(".toml").write_text(job_text(parse_deck(deck), DeckOptions("mm-kg-s", densities={}), deck.name))
     body = uncoupled_body(read_job(deck.with_suffix(".toml")), Stages())
     rows = {number: int(body.numbering.rows_of_node("test", number)[0]) for number in BOUNDARY}
     ends = [Interface(f"node {number}", "nodes", np.array([row]), body.nodes[row]) for number, row in rows.items()]

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from fe_models import solid_body, unit_system
 from fe_models.checks.mesh_report import report_mesh
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.read_deck import parse_deck
 from fe_models.files.read_mesh import read_mesh
 from fe_models.meshes.boundary import boundary_nodes
 from fe_models.meshes.mesh import Mesh
@@ -96,10 +96,10 @@ def test_pyramids_of_meshes_and_whole_decks(tmp_path, name):
         mesh = read_mesh(path)
         assert list(mesh.cells) == ["pyramid"]
         assert_allclose(report_mesh(mesh).volume, 2.0, rtol=1e-12)
-    deck = read_deck(path, program="abaqus") if name.endswith(".inp") else read_deck(path)
+    deck = parse_deck(path, program="abaqus") if name.endswith(".inp") else parse_deck(path)
     deck.ledger.require_whole()
     (block,) = deck.mesh.blocks
     assert_allclose(report_mesh(Mesh(deck.mesh.nodes, {block.kind: block.nodes})).volume, 2.0, rtol=1e-12)
     assert len(deck.solids) == 1
     if name.endswith(".inp"):  # CalculiX has no pyramids
-        assert ("C3D5", "1", "this element is not known here") in read_deck(path).ledger.rows()
+        assert ("C3D5", "1", "this element is not known here") in parse_deck(path).ledger.rows()

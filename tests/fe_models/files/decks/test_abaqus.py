@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from fe_models.elements.beams.sections import Circle
 from fe_models.errors import MeshError
 from fe_models.files.decks.deck import DeckMaterial, LineSection, ShellSection, SolidSection
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.read_deck import parse_deck
 from tests.bodies import box_mesh
 from tests.decks import write_deck
 
@@ -79,7 +79,7 @@ block, GRAV, 9.81, 0., 0., -2.
 def deck_of(tmp_path, text=DECK, **options):
     path = tmp_path / "model.inp"
     path.write_text(text)
-    return read_deck(path, **options)
+    return parse_deck(path, **options)
 
 
 def numbers(deck, group):
@@ -182,9 +182,9 @@ def test_the_same_deck_of_abaqus_has_other_masses(tmp_path):
 
 def test_suffixes_that_are_no_deck_and_missing_files_are_refused(tmp_path):
     with pytest.raises(MeshError, match=r"unknown suffix '\.xyz'"):
-        read_deck(tmp_path / "a.xyz")
+        parse_deck(tmp_path / "a.xyz")
     with pytest.raises(MeshError, match="cannot be read: No such file"):
-        read_deck(tmp_path / "a.inp")
+        parse_deck(tmp_path / "a.inp")
 
 
 PART = """*PART, NAME=Bar
@@ -254,7 +254,7 @@ def test_tied_nodes_follow_the_face_they_stand_on(tmp_path):
     extra += "*ELEMENT, TYPE=C3D4, ELSET=upper\n500, 900, 901, 902, 903\n*NSET, NSET=slaves\n900, 901, 902, 903\n"
     extra += "*SURFACE, NAME=below, TYPE=NODE\nslaves\n*SURFACE, NAME=above\nall, S2\n*TIE, NAME=t\nbelow, above\n"
     path.write_text(path.read_text() + extra)
-    deck = read_deck(path)
+    deck = parse_deck(path)
     assert (
         "*TIE",
         "1",

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from fe_models.files.decks.deck_images import Motion, moved_deck
 from fe_models.files.decks.ledger import Ledger
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.read_deck import parse_deck
 
 DECK = """BEGIN BULK
 CORD2R,5,,0.,0.,0.,.3,.2,1.
@@ -35,7 +35,7 @@ def test_axes_and_loads_of_an_image_go_with_the_motion(tmp_path, Q, side):
     """In a mirror the third axis is turned round, so that the axes are right-handed, and moments are pseudovectors."""
     path = tmp_path / "own.bdf"
     path.write_text(DECK)
-    deck = read_deck(path)
+    deck = parse_deck(path)
     moved = moved_deck(deck, Motion(Q, np.array([1.0, 2.0, 3.0])), Ledger("image"), "a part")
     keep = np.diag([1.0, 1.0, side])
     (support,), (spring,) = deck.supports, deck.springs

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from fe_models.errors import MeshError
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.read_deck import parse_deck
 from tests.bodies import box_mesh
 from tests.decks import write_deck
 
@@ -22,7 +22,7 @@ def deck_of(folder, points, line, extra=""):
     text = path.read_text().replace("*ELEMENT", nodes + "*ELEMENT", 1)
     text += '*MATERIAL, NAME=M\n*ELASTIC\n200., .3\n*DENSITY\n1.\n*SOLID SECTION, ELSET="all", MATERIAL=M\n'
     path.write_text(text + f"*MPC\n{line}\n{extra}")
-    return read_deck(path)
+    return parse_deck(path)
 
 
 def matrix(deck, numbers):

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from fe_models.elements.beams.sections import BoxSection
 from fe_models.errors import MeshError
 from fe_models.files.decks.abaqus.uneven_box import uneven_box
-from fe_models.files.decks.read_deck import read_deck
+from fe_models.files.decks.read_deck import parse_deck
 
 KEYS = {"area": "A", "iy": "Iy", "iz": "Iz", "torsion": "J", "shear_area_y": "A_sy", "shear_area_z": "A_sz"}
 
@@ -71,12 +71,12 @@ def test_the_centroid_lies_towards_the_thick_wall(tmp_path):
     """Wall 1 stands at +1, as CalculiX 2.20 has it: a cantilever pulled at its node bends towards the thick wall."""
     path = tmp_path / "box.inp"
     path.write_text(DECK)
-    (line,) = read_deck(path).lines
+    (line,) = parse_deck(path).lines
     assert line.offset[0] > 0.1
     assert line.offset[1] == 0
     path.write_text(DECK.replace("0.15, 0.2\n", "0.15, 0.25\n"))
     with pytest.raises(MeshError, match=r"1 .*BOX: walls that differ both ways"):
-        read_deck(path).ledger.require_whole()
+        parse_deck(path).ledger.require_whole()
     path.write_text(DECK.replace("0.3, 0.2, 0.15", "2.9, 0.2, 0.15"))
     with pytest.raises(MeshError, match="leave a hole"):
-        read_deck(path)
+        parse_deck(path)
