@@ -59,7 +59,7 @@ def run_steps(folder: Path, wait_for_kernels: Callable[[], None]) -> None:
         replace_file(folder / "rod.json", info_record(modal).encode("utf-8"))
         wait_for_kernels()
         run = begun(running, folder, "floatframe run crank.toml -o crank.h5")
-        schemas = schemas_named_in((folder / name).read_bytes() for name in JOBS)  # takes seconds, beside the run
+        schemas = schemas_named_in((folder / name).read_bytes() for name in JOBS)  # seconds, during the run
         replace_files({folder / name: content for name, content in schemas.items()})
         run.worker.wait()
         later = [

@@ -67,7 +67,7 @@ class _Text:
 
     def __init__(self, text: bytes, where: str) -> None:
         with warnings.catch_warnings():
-            warnings.simplefilter("error", DeprecationWarning)  # numpy's way to say that the text is not all numbers
+            warnings.simplefilter("error", DeprecationWarning)  # numpy warns if the text does not only contain numbers
             try:
                 self._values = np.fromstring(text.decode("ascii"), sep=" ")
             except (DeprecationWarning, ValueError) as error:

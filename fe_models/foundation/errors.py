@@ -1,6 +1,6 @@
 """The root of all errors, and the errors that every package may raise.
 
-Each package has a root of its own below this one: `FeModelsError`, `CmsError`, `FloatframeError`. Leaves also derive
+Each package has its own base class below this one: `FeModelsError`, `CmsError`, `FloatframeError`. Leaves also derive
 from the built-in error that a caller would expect. Errors about bodies and units derive from the roots of both
 `fe_models`, which raises them, and `cms`, whose callers catch them.
 """

@@ -433,7 +433,7 @@ def line_numbers(text: str) -> dict[Location, int]:
         try:
             parsed = tomllib.loads(statement)
         except tomllib.TOMLDecodeError:
-            continue  # the value goes on in the next line
+            continue  # the value continues on the next line
         is_header, is_row = statement.lstrip().startswith("["), statement.lstrip().startswith("[[")
         statement = ""
         path: Location = ()

@@ -120,9 +120,9 @@ class ModalBody:
 
 log = logging.getLogger(__name__)
 
-ONE_BODY = 1e-4  #: difference between M* and modal mass over the largest entry, above which the mode order is wrong
-MEAN_AXES = 1e-8  #: momentum of a mode over the largest possible for its mass, below which it is rounding in the file
-NO_ENERGY = 1e-13  #: squared frequency of a mode over the largest one, up to which it counts as zero
+ONE_BODY = 1e-4  #: difference of M* from modal mass divided by the largest entry; above it, the mode order is wrong
+MEAN_AXES = 1e-8  #: momentum of a mode divided by the largest for its mass; below it, it is rounding in the file
+NO_ENERGY = 1e-13  #: squared frequency of a mode divided by the largest one, up to which it counts as zero
 FEW = 12  #: largest number of nodes with rotations that become interfaces if none are named
 
 

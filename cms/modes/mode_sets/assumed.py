@@ -54,7 +54,7 @@ def assumed_modes(
     body
         A coupled body, or its `Families`, which several sets can share.
     n_modes
-        Number of functions for each of the four motions that has no number of its own.
+        Number of functions for each of the four motions for which no number is given.
     n_axial, n_bending, n_torsion
         Number of functions for this motion; n_bending counts for each of the two directions.
     functions

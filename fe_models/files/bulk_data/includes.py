@@ -38,7 +38,7 @@ def bulk_text(where: str, path: Path, text: str, included: dict[str, str], files
         head = line.lstrip().upper()
         if head.startswith("INCLUDE"):
             statement = line.partition("$")[0].strip()
-            while statement.count("'") % 2 and k + 1 < len(lines):  # names may go on over lines
+            while statement.count("'") % 2 and k + 1 < len(lines):  # names may continue on the next lines
                 k += 1
                 statement += lines[k].partition("$")[0].strip()
             name = statement[7:].strip().strip("'\" =")
@@ -49,7 +49,7 @@ def bulk_text(where: str, path: Path, text: str, included: dict[str, str], files
                 inner = other.read_bytes()
             except OSError as error:
                 if is_first and any(each.lstrip().upper().startswith("CEND") for each in lines[k:]):
-                    k += 1  # statements above CEND run the program: what they include is no part of a body
+                    k += 1  # statements above CEND control the program; their include files are not part of a body
                     continue
                 raise MeshError(
                     f"{where}: INCLUDE {name}: {other} cannot be read: {error.strerror or error}{near_file(other)}"

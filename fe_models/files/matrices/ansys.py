@@ -15,7 +15,7 @@ __all__ = ["read_full_part", "read_sub_part"]
 
 
 def read_full_part(path: Path, request: Request) -> ForeignMatrices:
-    """Read a .full file; positions come from a deck beside it.
+    """Read a .full file; positions come from a separate deck.
 
     Raises
     ------

@@ -265,7 +265,7 @@ def where_of(read: ForeignMatrices) -> str:
     return f"matrices {', '.join(read.files) or 'in memory'}"
 
 
-# what was read of matrices, for the user: files, rows, which triangle, what was assumed -------------------------------
+# report on imported matrices for the user: files, rows, stored triangle, assumptions ----------------------------------
 
 
 @dataclass(frozen=True, eq=False)

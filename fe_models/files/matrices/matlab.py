@@ -39,7 +39,7 @@ def read_matlab_5(path: Path, request: Request) -> ForeignMatrices:
     Raises
     ------
     MatrixError
-        As `from_named`.
+        If `from_named` raises it.
     """
     where = f"matrices {path}"
     wanted = [name for name, _, _ in scipy.io.whosmat(path)]

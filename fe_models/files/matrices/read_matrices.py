@@ -285,7 +285,7 @@ def read_part(path: Path, request: Request) -> ForeignMatrices:
         raise MatrixError(f"{where}: the file is empty")
     form = format_of(where, path, head)
     try:
-        with ThreadPoolExecutor(1) as beside:  # the digest takes a core of its own
+        with ThreadPoolExecutor(1) as beside:  # the digest uses another core
             digest = beside.submit(file_digest, path)
             part = form.read(path, request)
     except FeModelsError:

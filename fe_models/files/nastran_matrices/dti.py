@@ -70,7 +70,7 @@ def _entries(where: str, cards: list[Card], table: str) -> list[tuple[int, int, 
     if END not in words:
         raise MatrixError(f"{card.where}: expected {END} at the end of the record, got none: the file is truncated")
     words = words[: words.index(END)]
-    numbers = [word for word in words if not word.isalpha()]  # behind the names of the columns, TYPE ID COMP ROW
+    numbers = [word for word in words if not word.isalpha()]  # without the names of the columns, TYPE ID COMP ROW
     try:
         values = [int(word) for word in numbers]
     except ValueError as error:

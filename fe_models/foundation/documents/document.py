@@ -175,7 +175,7 @@ class Document:
 
 
 def cells_of(table: TextTable) -> list[list[Cell]]:
-    """Return the cells of a table: numbers under headings that say so, names first, verdicts in their colours."""
+    """Return the cells of a table; column headings that end in ">" mark columns of numbers."""
     is_number = [heading.endswith(">") for heading in table.headings]
     rows = []
     for row in table.rows:

@@ -21,7 +21,7 @@ LEAST_NODES = 60  #: smallest number of nodes that can represent the mass of a b
 EVEN = 0.3  #: weight, relative to the second moment, of the deviation from equal masses in the fit
 #: ratio between moments of nodal masses and of the file, above which the kept nodes do not represent its mass
 FAR_OFF = 4.0
-CLEAR = 0.1  #: moment over the largest possible one, above which its direction is checked
+CLEAR = 0.1  #: moment divided by the largest possible one, above which its direction is checked
 
 
 def check_gram(reduced: ReducedBody) -> QualityRecord:

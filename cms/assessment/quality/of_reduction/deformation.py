@@ -40,7 +40,7 @@ class DeformationError:
 
     t: Array  #: times, (n_t,) [time unit of the body]
     error: Mapping[str, Array]  #: eps(t) in each norm, (n_t,), from 0 to 1
-    size: Mapping[str, Array]  #: deformation |u_ref(t)| in each norm over its maximum, (n_t,)
+    size: Mapping[str, Array]  #: deformation |u_ref(t)| in each norm divided by its maximum, (n_t,)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "t", frozen(self.t))

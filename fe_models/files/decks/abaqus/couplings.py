@@ -195,7 +195,7 @@ def _mpcs(here: str, block: DeckBlock, draft: Draft) -> None:
     listed: list[list[str]] = []
     for line in block.lines:
         words = [word.strip() for word in line.rstrip(", ").split(",")]
-        if listed and words[0].isdigit():  # the line above goes on
+        if listed and words[0].isdigit():  # continues the line above
             listed[-1] += words[1:] if words[0] == "0" else words
         else:
             listed.append(words)

@@ -92,7 +92,7 @@ class Draft:
     # --- names of nodes ------------------------------------------------------------------------------------------
 
     def nodes_of(self, here: str, word: str) -> IntArray:
-        """Return the numbers of the nodes that a node number, a node set or an element set stands for."""
+        """Return the node numbers of a node number, a node set or an element set."""
         word = word.strip().strip('"')
         if word.lstrip("+").isdigit():
             return np.array([int(word)], dtype=np.int64)
@@ -102,7 +102,7 @@ class Draft:
         return self.mesh.node_sets[key]
 
     def elements_of(self, here: str, word: str) -> IntArray:
-        """Return the numbers of the elements that an element number or set stands for."""
+        """Return the element numbers of an element number or an element set."""
         word = word.strip().strip('"')
         if word.lstrip("+").isdigit():
             return np.array([int(word)], dtype=np.int64)

@@ -9,7 +9,7 @@ from fe_models.foundation.arrays import IntArray
 
 __all__ = ["PLANE", "SOLID_RULES", "faces_of", "read_element"]
 
-#: program -> type -> integration of the stiffness, mass, what is different (empty: as the program does)
+#: program -> type -> integration of the stiffness, mass, difference from the program (empty: none)
 SOLID_RULES: dict[str, dict[str, tuple[str, str, str]]] = {
     "calculix": {
         "C3D4": ("reduced", "reduced", ""),

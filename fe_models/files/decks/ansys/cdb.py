@@ -17,7 +17,7 @@ from fe_models.meshes.cells.raw_mesh import RawBlock, RawMesh
 __all__ = ["read_cdb_deck"]
 
 COLUMNS = 11  #: number of columns of an element before its nodes
-#: element -> integration, mass, what is different
+#: element -> integration, mass, difference from ANSYS
 SOLIDS = {
     185: (
         "incompatible",

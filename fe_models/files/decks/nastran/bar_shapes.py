@@ -228,7 +228,7 @@ def _channel_centre(b: float, h: float, t_w: float, t_f: float) -> float:
     With the lengths b and h of the middle lines, the shear centre lies 3 b² t_f/(6 b t_f + h t_w) behind the web.
     """
     b, h_w, h = b - t_w / 2, h - 2 * t_f, h - t_f
-    width = b - t_w / 2  # of a flange beside the web
+    width = b - t_w / 2  # width of a flange without the web
     area = 2 * width * t_f + (h_w + 2 * t_f) * t_w
     return 2 * width * t_f * (width + t_w) / 2 / area + 3 * b**2 * t_f / (6 * b * t_f + h * t_w)
 

@@ -124,7 +124,7 @@ def _arc(model: NastranModel, card: Card, known: Card, RC: float) -> _Arc | str:
     if kind == "1":
         if not abs(v @ d) > ALONG * np.linalg.norm(v) * L:
             return "GEOM = 1: its vector is across the line of its ends, where no centre of curvature lies"
-        height = float((d @ d) / (2 * (v @ d)) * (v @ beside))  # of the centre beside the chord
+        height = float((d @ d) / (2 * (v @ d)) * (v @ beside))  # of the centre above the chord, signed
         outward, half = -np.sign(height) * beside, float(np.arctan2(L / 2, abs(height)))
     elif kind == "2":
         outward, half = beside, float(np.arctan2(v @ beside, v @ along))

@@ -161,7 +161,7 @@ def _pbeaml_taper(card: Card) -> Taper | None:
         return None
     while any(words[at:]):
         if words[at].upper() not in ("YES", "NO", ""):
-            return None  # the reader of the section says what is wrong
+            return None  # the reader of the section reports the error
         x = real_of(words[at + 1]) if words[at + 1 : at + 2] and words[at + 1] else 1.0
         rows.append((x, _numbers(words[at + 2 : at + 3 + n], first)))
         at += n + 3
