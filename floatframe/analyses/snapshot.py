@@ -1,4 +1,4 @@
-"""Single states as trajectories, for which sensors, tables and pictures of motions also work."""
+"""Single states as motions, for which sensors, tables and pictures of motions also work."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,6 +14,7 @@ from floatframe.engine.kernels.memory import Rows
 from floatframe.engine.kernels.work import new_work
 from floatframe.model.state import State
 from floatframe.model.system import System
+from floatframe.results.motion import Motion, motion_of
 from floatframe.results.results_file import MemorySource
 from floatframe.results.trajectory import Trajectory
 from floatframe.simulation.motion_head import head_of, joint_rows
@@ -33,8 +34,8 @@ def snapshot(
     w: Array | None = None,
     *,
     t: float = 0.0,
-) -> Trajectory:
-    """Return one state as a trajectory with one time, for sensors, exports and pictures.
+) -> Motion:
+    """Return one state as a motion with one time: `snapshot(system, rest).sensor("tip").x`, `.to_dataframe()`.
 
     Parameters
     ----------
@@ -62,8 +63,8 @@ def snapshot(
     return as_motion(system, [rows], t, t)
 
 
-def states_as_motion(system: System, states: Sequence[State]) -> Trajectory:
-    """Return a sequence of states as a trajectory at times 0, 1, 2, ... without forces, for pictures."""
+def states_as_motion(system: System, states: Sequence[State]) -> Motion:
+    """Return a sequence of states as a motion at times 0, 1, 2, ... without forces, for pictures."""
     compiled = compiled_system(system)
     model, work = compiled.model, new_work(compiled.model)
     still, w = np.zeros(int(model.bodies.u0[-1])), np.zeros(int(model.connections.w0[-1]))
@@ -74,7 +75,7 @@ def states_as_motion(system: System, states: Sequence[State]) -> Trajectory:
     return as_motion(system, found, 0.0, float(max(len(states) - 1, 0)))
 
 
-def as_motion(system: System, rows: list[Rows], t: float, t_end: float) -> Trajectory:
-    """Return result rows as a trajectory in memory."""
+def as_motion(system: System, rows: list[Rows], t: float, t_end: float) -> Motion:
+    """Return result rows as a motion in memory."""
     head = head_of(system, Snapshot(), t, t_end, 1.0, 1)  # type: ignore[arg-type]
-    return Trajectory(head, MemorySource(joint_rows(system, rows)), is_complete=True)
+    return motion_of(Trajectory(head, MemorySource(joint_rows(system, rows)), is_complete=True), system)

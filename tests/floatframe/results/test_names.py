@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import floatframe as ff
+from floatframe.analyses.snapshot import snapshot
 from floatframe.files.system_file.read_system import read_system
 from floatframe.results.sensors import sensor_and_column
 
@@ -168,3 +169,12 @@ def test_a_study_and_a_gradient_take_both_forms(tmp_path):
     assert_array_equal(found.gradient[0], found.gradient[1])
     assert_array_equal(found.values[0], found.values[1])
     assert np.isfinite(found.gradient).all()
+
+
+def test_an_equilibrium_as_a_motion_takes_the_names(system):
+    """Stiffness times angle is the moment of weight less push, half a metre from the hinge."""
+    rest = snapshot(system, ff.static_equilibrium(system))
+    (angle,) = rest.sensor("pin.angle.value").value
+    assert_allclose(500.0 * angle, (2 * 9.81 - 1.0) * 0.5 * np.cos(angle), rtol=1e-9)
+    assert_allclose(rest.sensor("tip z").z, [-np.sin(angle)], rtol=1e-12)
+    assert rest.to_dataframe("tip").shape == (1, 4)
