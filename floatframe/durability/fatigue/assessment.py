@@ -86,7 +86,7 @@ def assess(given: FatigueFile, *, progress: Progress | None = None) -> Assessmen
     Raises
     ------
     FatigueError, ResultsError, BodyError
-        If files do not fit together, or as `history_damage` and `spectral_damage` raise.
+        If files do not belong together; also the errors of `history_damage` and `spectral_damage`.
     """
     body = read(given.body)
     materials = [material_of(key, each, given, body) for key, each in given.all_materials.items()]
@@ -258,7 +258,8 @@ def block_of(section: BlockSection, given: FatigueFile, body: ReducedBody) -> Lo
     if entry.digest and entry.digest != digest(given.body):
         raise FatigueError(
             f"block {name!r}: body {section.body!r} of {section.results} was computed with another modal file "
-            f"({entry.source}) than {given.body}, or it has changed since; give that file, or run the motion again"
+            f"({entry.source}) than {given.body}, or this file has changed since; give the other file, or compute the "
+            "motion again"
         )
     if trajectory.units != body.units:
         body_q = body.units.to_si(length=2, mass=1) ** 0.5
@@ -285,7 +286,10 @@ def matched(section: BlockSection, trajectory: Trajectory, name: str) -> float:
     assert match is not None
     system = recorded_system(trajectory)
     if system is None:
-        raise FatigueError(f"block {name!r}: match: the system file of {section.results} is gone, with its sensors")
+        raise FatigueError(
+            f"block {name!r}: match: the system file of {section.results}, which defines its sensors, does not exist "
+            "any more"
+        )
     found = measurement_of(system, trajectory, match.sensor)
     chosen = np.ones(len(trajectory.t), bool)
     if section.times is not None:
@@ -335,7 +339,7 @@ def shaken_of(given: FatigueFile, body: ReducedBody) -> tuple[list[ModalSpectra]
     job = read_shake(section.shake)
     if digest(job.source) != digest(given.body) or job.structure.units != body.units:
         raise FatigueError(
-            f"{section.shake}: expected it to shake {given.body} in the units of that file, got {job.source} in "
+            f"{section.shake}: expected a test of {given.body} in the units of that file, got {job.source} in "
             f"{job.structure.units.name}"
         )
     tests = {test.name: test for test in job.random}
@@ -362,8 +366,8 @@ def spectra_of(section: SpectrumSection) -> ModalSpectra:
     missing = {"frequencies", "spectra"} - set(content)
     if missing:
         raise FatigueError(
-            f"{section.file}: expected the arrays frequencies (n_f,) and spectra (n_f, n_q, n_q), one-sided, and "
-            f"duration and mean if wanted; {', '.join(sorted(missing))} missing"
+            f"{section.file}: expected the arrays frequencies (n_f,) and spectra (n_f, n_q, n_q), one-sided, "
+            f"optionally duration and mean; {', '.join(sorted(missing))} missing"
         )
     duration = section.duration if section.duration is not None else content.get("duration")
     if duration is None or np.size(duration) != 1:
@@ -375,9 +379,9 @@ def spectra_of(section: SpectrumSection) -> ModalSpectra:
 
 
 # damage of a shaken body: the random test of `floatframe shake` gives the cross spectra of its modes ------------------
-# The modes with the bases held, eta, and the motion of the inputs are the coordinates: their stress at kept nodes and
-# stress points is the field of the model, and their cross spectra G = H S H^H are exact at the frequencies of the run,
-# with its weights.
+# The coordinates are the modes with fixed bases, eta, and the motions of the inputs. The field of the model is their
+# stress at kept nodes and stress points. Their cross spectra G = H S H^H are exact at the frequencies of the run, and
+# integrals use the weights of the run.
 
 
 def shaken_spectra(model: ShakenModel, test: RandomTest, run: RandomRun, duration: float) -> tuple[ModalSpectra, Array]:
@@ -438,7 +442,7 @@ def shaken_damage(
     curve
         S-N curve in stress units of the body; amplitudes, not ranges.
     duration
-        Of each run [s]; None: that of the test.
+        Duration of each run [s]; None: the duration of the test.
     method
         One of `SPECTRAL_METHODS`.
     criterion
@@ -448,17 +452,17 @@ def shaken_damage(
     extrapolate
         As for `spectral_damage`.
     nodes
-        Kept nodes to look at; None: all on the surface.
+        Kept nodes to assess; None: all on the surface.
 
     Raises
     ------
     FatigueError
-        If no duration is known, the runs are of another test, or as `spectral_damage` raises.
+        If no duration is known, or the runs belong to another test; also the errors of `spectral_damage`.
     """
     chosen = [run for run in runs if run.test == test.name]
     lasts = duration if duration is not None else test.duration
     if lasts is None or not chosen:
-        what = "no run of it was made" if not chosen else "how long it lasts is not known; give duration"
+        what = "expected one of its runs, got none" if not chosen else "its duration is not known; give duration"
         raise FatigueError(f"random test {test.name!r}: {what}")
     made = [shaken_spectra(model, test, run, lasts) for run in chosen]
     return spectral_damage(

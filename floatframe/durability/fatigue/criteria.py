@@ -16,13 +16,13 @@ __all__ = ["CRITERIA", "TENSORS", "Criterion", "largest_size"]
 
 #: description of each criterion, by name
 CRITERIA = {
-    "signed-von-mises": "von Mises stress with the sign of the principal stress of largest size",
-    "principal": "the principal stress of largest size",
-    "normal": "normal stress on the plane across the surface where it does most damage",
-    "shear": "twice the shear stress on the plane, across the surface or at 45 degrees to it, where it is worst",
-    "findley": "shear amplitude + k times the largest normal stress, on the plane where that does most damage",
+    "signed-von-mises": "von Mises stress with the sign of the principal stress of largest absolute value",
+    "principal": "the principal stress of largest absolute value",
+    "normal": "normal stress on the plane normal to the surface with the largest damage",
+    "shear": "twice the shear stress on the plane normal or at 45 degrees to the surface with the largest damage",
+    "findley": "shear amplitude + k times the largest normal stress, on the plane with the largest damage",
 }
-TENSORS = {"full": "all six components", "surface": "the three components in the tangent plane; the rest taken as zero"}
+TENSORS = {"full": "all six components", "surface": "the three components in the tangent plane; the others are zero"}
 PLANES = ("normal", "shear", "findley")
 
 #: weights of xx yy zz yz xz xy in the Euclidean norm |sigma|² = sigma : sigma
@@ -32,7 +32,7 @@ FROBENIUS = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
 @dataclass(frozen=True)
 @checked_fields(ModelError)
 class Criterion:
-    """A criterion. Its stresses equal those of a bar under tension, so that curves measured on bars apply.
+    """A criterion. In a bar under tension it equals the axial stress, so that curves measured on bars apply.
 
     Parameters
     ----------

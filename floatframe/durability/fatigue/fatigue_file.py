@@ -42,9 +42,9 @@ __all__ = [
 
 
 # factors on the amplitudes of S-N curves by published formulas: roughness, size, scatter ------------------------------
-# Tests are of small polished specimens; a part is rough and large. Each formula is one of a guideline or textbook, with
-# the range that it was made for; beyond it is refused. They are of the fatigue limit: on a whole curve they are on the
-# safe side at few cycles.
+# S-N curves are measured on small polished specimens; a part is rough and large. Each formula comes from a guideline or
+# textbook, and inputs outside its range are refused. The formulas hold for the fatigue limit; applied to the whole
+# curve, they are conservative at few cycles.
 
 
 #: a_R and smallest tensile strength [MPa] in the roughness factor, by group of materials (FKM guideline)
@@ -73,7 +73,7 @@ def roughness_factor(tensile_strength: float, roughness: float, group: str = "st
     tensile_strength
         R_m [MPa].
     roughness
-        R_z [um]: polished up to 1, ground some 10, machined up to 100, rolled and cast 200.
+        R_z [um]: up to 1 if polished, about 10 if ground, up to 100 if machined, 200 if rolled or cast.
     group
         One of `ROUGHNESS`.
 
@@ -90,7 +90,7 @@ def roughness_factor(tensile_strength: float, roughness: float, group: str = "st
     if not least / 2 <= tensile_strength <= 3000:
         raise FatigueError(
             f"roughness factor: tensile strength: expected {least / 2:g} to 3000 MPa of {group}, got "
-            f"{tensile_strength:g}; look at its unit"
+            f"{tensile_strength:g}; check its unit"
         )
     return 1.0 if roughness <= 1 else 1 - a_R * math.log10(roughness) * math.log10(2 * tensile_strength / least)
 
@@ -98,8 +98,8 @@ def roughness_factor(tensile_strength: float, roughness: float, group: str = "st
 def technological_size_factor(diameter: float, group: str) -> float:
     """Return K_d = F(d)/F(d_N) for d > d_N, else 1; F(d) = 1 - 0.7686 a_d lg(d/7.5 mm) (FKM (2012)).
 
-    For strengths that a standard gives for semi-finished products up to the diameter d_N; a strength measured on the
-    part needs none.
+    It applies to strengths that a standard gives for semi-finished products up to the diameter d_N; a strength measured
+    on the part needs no such factor.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def technological_size_factor(diameter: float, group: str) -> float:
     Raises
     ------
     FatigueError
-        If the group is unknown, or the diameter not above 0.
+        If the group is unknown, or the diameter is not above 0.
     """
     standard, a_d = of_group("technological size factor", group, TECHNOLOGY)
     if not 0 < diameter < 1e5:
@@ -126,13 +126,13 @@ def technological_size_factor(diameter: float, group: str) -> float:
 def size_factor(diameter: float) -> float:
     """Return k_b of round bars in bending or torsion: (d/7.62)^-0.107 up to 51 mm, 1.51 d^-0.157 beyond.
 
-    Eq. 6-20 of Budynas & Nisbett (2011). Of bars under tension it is 1. Where
-    stress gradients are counted otherwise this counts them again.
+    Eq. 6-20 of Budynas & Nisbett (2011). For bars under tension the factor is 1. It contains the effect of the stress
+    gradient, which must not be included a second time.
 
     Parameters
     ----------
     diameter
-        [mm], 2.79 to 254; of a round that rotates in its bending.
+        Diameter of a round bar in rotating bending, 2.79 to 254 mm.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def reliability_factor(survival: float) -> float:
     Parameters
     ----------
     survival
-        Probability, 0.5 to below 1, that z is the quantile of.
+        Probability of survival, 0.5 to below 1; z is its quantile.
 
     Raises
     ------
@@ -190,7 +190,7 @@ FACTOR_METHODS: dict[str, FactorMethod] = {
         lambda given, _: technological_size_factor(number(given, "diameter"), word(given, "group")),
     ),
     "shigley-size": FactorMethod(
-        "k_b of rounds in bending and torsion", ("diameter",), False,
+        "k_b of round bars in bending and torsion", ("diameter",), False,
         lambda given, _: size_factor(number(given, "diameter")),
     ),
     "shigley-reliability": FactorMethod(
@@ -221,8 +221,8 @@ STRESS_UNITS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "N/mm^2": 1e6, "GPa": 1e9, "p
 #: which places are assessed, by name
 PLACES = {
     "all": "nodes of the surface and stress points of elements",
-    "nodes": "nodes of the surface, whose stress is a mean over elements",
-    "points": "stress points, each of its own element",
+    "nodes": "nodes of the surface, whose stress is averaged over elements",
+    "points": "stress points, each in one element",
 }
 
 Positive = Annotated[float, Field(gt=0)]
@@ -252,8 +252,8 @@ class CurveSection(Table):
         "elementary", description=f"one of {', '.join(BELOW)}"
     )
     stress_ratio: Annotated[float, Field(ge=-1, lt=1)] = Field(-1.0, description="R of the tests, -1 to below 1")
-    least_cycles: Positive = Field(1000.0, description="a number above 0, where a curve by slope begins")
-    survival: Annotated[float, Field(gt=0, lt=1)] = Field(0.5, description="survival that the curve holds for, 0 to 1")
+    least_cycles: Positive = Field(1000.0, description="a number above 0, first cycles of a curve by slope")
+    survival: Annotated[float, Field(gt=0, lt=1)] = Field(0.5, description="survival of the curve, between 0 and 1")
     log_deviation: Annotated[float, Field(ge=0)] | None = Field(
         None, description="a number, standard deviation of log10 N"
     )
@@ -264,7 +264,7 @@ class CurveSection(Table):
         given = [name for name, value in by_slope.items() if value is not None]
         tables = [name for name in ("amplitudes", "ranges") if getattr(self, name) is not None]
         if self.cycles is None:
-            raise ValueError("cycles: missing; expected the cycles of the knee, or of the table")
+            raise ValueError("cycles: missing; expected the cycles of the knee or the table")
         if tables:
             if given or self.second_slope is not None or not isinstance(self.cycles, tuple):
                 raise ValueError(f"expected a table (cycles and {tables[0]}, lists) or a knee (a number of cycles and "
@@ -335,7 +335,7 @@ def factor(value: Any) -> Any:
             details = problem.errors(include_url=False)
             raise ValueError("; ".join(describe(FactorSection, detail) for detail in details)) from None
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
-        raise ValueError("expected a number above 0, or a table: method, and what its formula needs")
+        raise ValueError("expected a number above 0, or a table with method and the keys of its formula")
     return float(value)
 
 
@@ -343,18 +343,18 @@ Factor = Annotated[float | FactorSection, BeforeValidator(factor)]
 
 
 class PlacesSection(MaterialSection):
-    """[materials.NAME]: a material with the places that have it."""
+    """[materials.NAME]: a material and the places made of it."""
 
     sets: list[str] = Field([], description="a list of names of sets of nodes or elements")
     elements: list[int | str] = Field([], description="a list of numbers of elements")
     nodes: list[int | str] = Field([], description="a list of numbers of nodes")
-    points: list[str] = Field([], description="a list of names of stress points, or of how they begin")
-    factors: dict[str, Factor] = Field({}, description="numbers or formulas by name, beside those of [factors]")
+    points: list[str] = Field([], description="a list of names of stress points, or of beginnings of names")
+    factors: dict[str, Factor] = Field({}, description="numbers or formulas by name, in addition to [factors]")
 
     @model_validator(mode="after")
     def _places(self) -> "PlacesSection":
         if not (self.sets or self.elements or self.nodes or self.points):
-            raise ValueError("expected the places that have it: sets, elements, nodes or points")
+            raise ValueError("expected the places of the material: sets, elements, nodes or points")
         return self
 
 
@@ -372,7 +372,7 @@ class CriterionSection(Table):
     mean_stress: choice("mean stress correction", lambda: tuple(MEAN_STRESS)) = Field(  # type: ignore[valid-type]
         "none", description=f"one of {', '.join(MEAN_STRESS)}"
     )
-    credit_compression: bool = Field(False, description="true or false: whether a compressive mean helps")
+    credit_compression: bool = Field(False, description="true or false: whether a compressive mean increases the life")
 
 
 class CountingSection(Table):
@@ -389,7 +389,7 @@ class CountingSection(Table):
 
 
 class MatchSection(Table):
-    """match of a block: as often as a measured event does its damage."""
+    """match of a block: repeats with which the block has the pseudo-damage of a measured event."""
 
     measured: InputFile = Field(description="a file of measured signals")
     signal: str = Field(description="a signal of that file")
@@ -404,9 +404,9 @@ class BlockSection(Table):
     results: InputFile = Field(description="a results file, relative to this file")
     body: str = Field(description="the name of the body in the results")
     repeats: Positive = Field(1.0, description="a number above 0")
-    scale: float = Field(1.0, description="a number other than 0, of the loads")
+    scale: float = Field(1.0, description="a number other than 0, the factor on the loads")
     times: Range | None = Field(None, description="[from, to], part of the motion")
-    gaps: bool = Field(False, description="true or false: whether long steps of time are meant")
+    gaps: bool = Field(False, description="true or false: whether long time steps are intended")
     match: MatchSection | None = Field(None, description="a table: measured, signal, sensor, slope")
 
 
@@ -419,7 +419,7 @@ class SpectrumSection(Table):
     test: str | None = Field(None, description="the name of the random test of a shake file")
     duration: Positive | None = Field(None, description="a number above 0 [s]; default: that of the file")
     repeats: Positive = Field(1.0, description="a number above 0")
-    scale: float = Field(1.0, description="a number other than 0, of the loads")
+    scale: float = Field(1.0, description="a number other than 0, the factor on the loads")
 
     @model_validator(mode="after")
     def _one_source(self) -> "SpectrumSection":
@@ -433,14 +433,14 @@ class ProgrammeSection(Table):
 
     amount: Positive = Field(1.0, description="a number above 0, such as kilometres")
     unit: str = Field("passes", description="text, such as km, flights, h")
-    target: Positive | None = Field(None, description="a number above 0, the life that is wanted, in that unit")
+    target: Positive | None = Field(None, description="a number above 0, the required life in that unit")
 
 
 class OutputsSection(Table):
     """[outputs]: the places that are assessed, and the results that are shown."""
 
     worst: Annotated[int, Field(ge=1, le=10_000)] = Field(20, description="a whole number, 1 to 10000, nodes of tables")
-    set: str | None = Field(None, description="a set of the mesh; only its nodes and points are looked at")
+    set: str | None = Field(None, description="a set of the mesh; only its nodes and points are assessed")
     places: choice("places", lambda: tuple(PLACES)) = Field(  # type: ignore[valid-type]
         "all", description=f"one of {', '.join(PLACES)}"
     )
@@ -452,7 +452,7 @@ class FatigueFile(Table):
     kind: str = kind_field("fatigue")
     body: InputFile = Field(description="the path of a modal file, relative to this file")
     material: MaterialSection | None = Field(None, description="the table [material]")
-    materials: dict[str, PlacesSection] = Field({}, description="tables [materials.NAME], of the places they name")
+    materials: dict[str, PlacesSection] = Field({}, description="tables [materials.NAME], for the places in them")
     factors: dict[str, Factor] = Field({}, description="numbers or formulas by name, on the amplitudes of the curves")
     survival: Annotated[float, Field(gt=0, lt=1)] | None = Field(None, description="a number from 0 to 1")
     criterion: CriterionSection = Field(
@@ -475,7 +475,7 @@ class FatigueFile(Table):
         if bool(self.blocks) == bool(self.spectra):
             raise ValueError("expected [[blocks]] or [[spectra]], " + ("got both" if self.blocks else "got neither"))
         if any(each.shake for each in self.spectra) and len(self.spectra) > 1:
-            raise ValueError("[[spectra]]: a shake file has coordinates of its own: expected no other table beside it")
+            raise ValueError("[[spectra]]: expected a shake file alone, because it has coordinates of its own")
         if not self.all_materials:
             raise ValueError("material: missing; expected the table [material], or tables [materials.NAME]")
         need = MEAN_STRESS[self.criterion.mean_stress][1]
@@ -512,7 +512,7 @@ def read_fatigue(path: str | os.PathLike[str]) -> FatigueFile:
     Raises
     ------
     FatigueError
-        With every problem: key path, value, what was expected, choices and the nearest name.
+        If the file is not valid; the message lists every problem, with key path, value, expected value and choices.
     """
     path = Path(path)
     return validated(FatigueFile, read_toml(path, FatigueError), path, FatigueError, context=path.parent)

@@ -1,9 +1,9 @@
 """Damage from modal histories: stresses of a few nodes and times are computed and counted without being stored.
 
-sigma(x, t) = sum_k S_k(x) q_k(t) is never stored: tiles of nodes times modes are multiplied with modes times a chunk of
-times, made a scalar, and streamed through the four-point rule. Nodes come in the order of their bounds (`bounds`), the
-greatest first; the rest is left out as soon as none of it can reach the share of the greatest damage found that is
-asked for.
+sigma(x, t) = sum_k S_k(x) q_k(t) is never stored: the stress shapes of a tile of nodes are multiplied by a chunk of the
+history, the criterion makes the product a scalar, and the four-point rule counts its cycles. Nodes are counted in the
+order of their bounds, the largest first, until no remaining node can reach the share `negligible` of the largest damage
+found.
 """
 
 import os
@@ -34,27 +34,28 @@ __all__ = [
 
 
 # bounds ---------------------------------------------------------------------------------------------------------------
-# Upper bounds of the damage of a node from its stress shapes and the modal history alone: which nodes cannot matter.
+# Upper bounds of the damage of a node from its stress shapes and the modal history, to find nodes with negligible
+# damage.
 #
 # With q(t) = L z(t), L L.T = C any positive definite matrix, rho(t) = |z(t)| and the stress sigma = S q in a Euclidean
 # norm |A sigma|,
 #
 #     |A sigma(t)| <= lam rho(t),  lam = largest singular value of A S L.          (1)
 #
-# Every cycle has two turning points s_i, s_j, and the equivalent amplitude of each law for mean stress at R = -1 is at
-# most max(|s_i|, |s_j|), as long as that is below the strength of the law. As every value of the history is a turning
-# point of one cycle at most (two half ones in the residue), and damage d grows with the amplitude,
+# Every cycle has two turning points s_i, s_j. For each mean stress law, the equivalent amplitude at R = -1 is at most
+# max(|s_i|, |s_j|) if this is below the strength of the law. Every value of the history is a turning point of at most
+# one cycle (or of two half cycles in the residue), and the damage d grows with the amplitude, so that
 #
 #     D <= sum_t d(c lam rho(t)),  |s(t)| <= c |A sigma(t)|,                        (2)
 #
-# a function of the one number lam: it is tabulated once for a history, rounded upwards. Findley's parameter takes its
-# normal stress from another time than its shear; there D <= n_t d(c lam max rho). C is chosen so that sum rho^k is
-# small for the slope k of the curve: C ~ sum rho^(k-2) q q.T, iterated from the covariance. A second bound of the same
-# kind, with the sizes of the shapes one by one,
+# which is a function of lam alone; it is tabulated once for each history and rounded upwards. Findley's parameter takes
+# its normal stress from another time than its shear, so that D <= n_t d(c lam max rho). C is chosen so that sum rho^k
+# is small for the slope k of the curve: C ~ sum rho^(k-2) q q.T, iterated from the covariance. A second bound of the
+# same kind, with the norm of each shape,
 #
 #     |A sigma(t)| <= sum_k |A S_k| max |q_k|,  D <= n_t d(c of that),              (3)
 #
-# is taken where it is smaller.
+# is used if it is smaller.
 
 
 ROUNDING = 1.0 + 1e-9  #: factor by which all bounds are rounded upwards
@@ -148,8 +149,8 @@ def damage_bounds(
 
 #: treatment of the residue of a block, by name
 RESIDUES = {
-    "half": "its ranges count as half cycles, as ASTM E1049 has it",
-    "repeat": "the block follows itself without end: all cycles are whole",
+    "half": "its ranges count as half cycles (ASTM E1049)",
+    "repeat": "the block is repeated endlessly: all cycles are whole",
 }
 TILE = 32  #: number of nodes processed at once; fewer for criteria with more than six rows
 CHUNK = 1024  #: number of times processed at once
@@ -199,18 +200,18 @@ def count_histories(
     residue
         One of `RESIDUES`.
     frames
-        Tangents and normal of each place, (n, 3, 3), where the criterion needs them (`surface_frames`).
+        Tangents and normal of each place, (n, 3, 3), if the criterion needs them (`surface_frames`).
     negligible
-        Places whose damage is proved to be below this share of the greatest are left out; 0: none.
+        Places whose damage is proved to be below this share of the largest damage are excluded; 0: none.
     greatest
-        Damage that was found at other places before.
+        Largest damage found at other places before.
     workers
-        Threads; None: one a processor.
+        Number of threads; None: one per processor.
 
     Raises
     ------
     FatigueError
-        If blocks and shapes do not fit, or the criterion has no use for the correction.
+        If blocks and shapes do not fit, or the criterion does not support the correction.
     """
     check(stress, blocks, criterion, mean_stress, residue, negligible)
     n = len(stress)
@@ -267,8 +268,8 @@ def check(
         raise FatigueError(f"fatigue: negligible: expected a share from 0 to below 1, got {negligible:g}")
     if criterion.is_shear and mean_stress.name != "none":
         raise FatigueError(
-            f'fatigue: criterion "{criterion.name}" with mean stress "{mean_stress.name}": shear does not know tension '
-            'from compression, and findley has the normal stress in itself; take mean stress "none"'
+            f'fatigue: criterion "{criterion.name}" with mean stress "{mean_stress.name}": shear does not distinguish '
+            'tension from compression, and findley contains the normal stress; take mean stress "none"'
         )
     for block in blocks:
         if block.q.shape[1] != stress.shape[2]:

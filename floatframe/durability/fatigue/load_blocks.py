@@ -59,8 +59,8 @@ class LoadBlock:
             i = int(np.argmax(bad))
             at = f", t = {self.t[i]:.6g}" if len(self.t) == len(self.q) else ""
             raise FatigueError(
-                f"{where}: {int(bad.sum())} of {len(bad)} rows hold NaN or infinity, first row {i}{at}: a gap in the "
-                "history; cut it with times = [from, to], or fill it before"
+                f"{where}: {int(bad.sum())} of {len(bad)} rows contain NaN or infinity, first row {i}{at}: a gap in "
+                "the history; cut it with times = [from, to], or fill the gap first"
             )
         if self.t.size:
             self.check_times(where)
@@ -68,7 +68,7 @@ class LoadBlock:
     def check_times(self, where: str) -> None:
         """Raise `FatigueError` unless times match the rows, increase, and have no gap."""
         if self.t.shape != (len(self.q),):
-            raise FatigueError(f"{where}: t: expected {len(self.q)} times, one a row, got {self.t.shape}")
+            raise FatigueError(f"{where}: t: expected {len(self.q)} times, one per row, got {self.t.shape}")
         steps = np.diff(self.t)
         if not np.isfinite(self.t).all() or not (steps > 0).all():
             i = int(np.argmin(np.where(np.isfinite(steps), steps, -np.inf)))
@@ -79,8 +79,8 @@ class LoadBlock:
         if steps[i] > GAP * np.median(steps) and not self.has_gaps:
             raise FatigueError(
                 f"{where}: t: a gap from {self.t[i]:.6g} to {self.t[i + 1]:.6g}, {steps[i] / np.median(steps):.3g} "
-                "times the usual step; cycles in it are not known: cut it with times = [from, to], or say gaps = true "
-                "if it is meant"
+                "times the usual step; cycles in it are unknown: cut it with times = [from, to], or set gaps = true "
+                "if it is intended"
             )
 
     @property
@@ -112,17 +112,17 @@ def block_of_results(
     repeats
         How often the block occurs in one pass through the programme.
     scale
-        Factor on the loads, and so on all modal coordinates.
+        Factor on the loads, and thus on all modal coordinates.
     times
         Part of the motion, from and to [s]; None: all of it.
     has_gaps
-        Whether time steps that are much longer than the others are intended; else they are refused.
+        Whether time steps that are much longer than the others are intended; otherwise they are refused.
 
     Raises
     ------
     ResultsError, FatigueError
         If there is no such body, it is rigid, the run did not reach its end and no `times` are given, or the part
-        holds fewer than two output times.
+        contains fewer than two output times.
     """
     name = name or body_name
     motion = trajectory.body(body_name)
@@ -133,12 +133,12 @@ def block_of_results(
         chosen = (motion.t >= times[0]) & (motion.t <= times[1])
         if chosen.sum() < 2:
             raise FatigueError(
-                f"load block {name!r}: times = [{times[0]:g}, {times[1]:g}]: expected two output times or more in it; "
-                f"the results reach from {motion.t[0]:g} to {motion.t[-1]:g}"
+                f"load block {name!r}: times = [{times[0]:g}, {times[1]:g}]: expected at least two output times in "
+                f"this range; the results cover {motion.t[0]:g} to {motion.t[-1]:g}"
             )
     elif not trajectory.is_complete:
         raise FatigueError(
-            f"load block {name!r}: this run did not reach its end; go on with floatframe resume, or take the part that "
-            f"is meant with times = [{motion.t[0]:g}, {motion.t[-1]:g}]"
+            f"load block {name!r}: this run did not reach its end; continue it with floatframe resume, or select a "
+            f"part with times = [{motion.t[0]:g}, {motion.t[-1]:g}]"
         )
     return LoadBlock(name, motion.q[chosen], motion.t[chosen], repeats, scale, has_gaps)

@@ -1,8 +1,8 @@
 """Mean stress: the amplitude, at the stress ratio of the curve, with the same damage as a cycle with another mean.
 
-Written with the amplitude S_a, the mean S_m and S_max = S_a + S_m. A correction gives the fully reversed amplitude
-S_ar (R = -1) of a cycle; the amplitude S at the ratio R of the curve, whose cycles have the mean c S with
-c = (1 + R) / (1 - R), is the one with the same S_ar.
+With the amplitude S_a, the mean S_m and S_max = S_a + S_m, a correction gives the fully reversed amplitude S_ar
+(R = -1) of a cycle. The equivalent amplitude S at the stress ratio R of the curve has the same S_ar; cycles of the
+curve have the mean c S with c = (1 + R) / (1 - R).
 
 - none: S = S_a.
 - goodman: S_ar = S_a / (1 - S_m / R_m), R_m tensile strength; soderberg and morrow: the same with the yield strength
@@ -13,7 +13,7 @@ c = (1 + R) / (1 - R), is the one with the same S_ar.
 - fkm: sensitivity M, straight pieces of S_ar over S_m: S_a (1 - M) for R > 1; S_a + M S_m for R <= 0;
   (1 + M) (S_a + M/3 S_m) / (1 + M/3) for 0 < R < 1/2; 3 (1 + M)² S_a / (3 + M) for R >= 1/2.
 
-Goodman, Soderberg, Morrow and Gerber take a mean in compression as none unless `credit_compression` says otherwise.
+Goodman, Soderberg, Morrow and Gerber treat a compressive mean as zero unless `credit_compression` is set.
 """
 
 import math
@@ -71,8 +71,8 @@ class MeanStress:
             raise FatigueError(f"mean stress: {self.name}: expected {words}, got {self.value:g}; give {key}")
         if self.credit_compression and law != LINE:
             raise FatigueError(
-                f"mean stress: {self.name}: credit_compression is for goodman, soderberg and morrow; the law itself "
-                "says what compression does"
+                f"mean stress: {self.name}: credit_compression is for goodman, soderberg and morrow; this law "
+                "defines the effect of compression itself"
             )
 
     @property
@@ -89,7 +89,7 @@ class MeanStress:
     def limit(self, largest: float, /) -> float:
         """Return kappa with S_ar <= kappa S_a for all cycles between -largest and largest; inf if there is no bound.
 
-        goodman and its kin: 1 / (1 - largest / R_m); gerber likewise with the square; fkm: 3 (1 + M)² / (3 + M).
+        goodman, soderberg and morrow: 1 / (1 - largest / R_m); gerber: with the square; fkm: 3 (1 + M)² / (3 + M).
         """
         if self.law == NONE:
             return 1.0

@@ -129,7 +129,7 @@ def worst_table(made: Assessment) -> Table:
 def nodes_of_places(result: FatigueResult) -> tuple[IntArray, IntArray]:
     """Return places and the kept nodes at which they are shown; a stress point is shown at the nearest node.
 
-    Near is within a hundredth of the size of the body; other points are shown nowhere.
+    The distance is at most a hundredth of the size of the body; other points are not shown.
     """
     from scipy.spatial import cKDTree
 
@@ -169,7 +169,7 @@ def vtu_of(made: Assessment) -> bytes:
         **numbers_of_nodes(body),
     }
     header = (
-        f"damage and life of {body.name}; life in {made.given.programme.unit}; where is counted = 0, damage is an "
+        f"damage and life of {body.name}; life in {made.given.programme.unit}; where counted = 0, damage is an "
         "upper bound and life a lower one",
     )
     points = body.frame.origin + body.nodes @ body.frame.axes.T

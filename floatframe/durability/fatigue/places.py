@@ -68,14 +68,14 @@ def assessed_places(
     Parameters
     ----------
     nodes
-        Kept nodes; None: all on the surface, as far as the body has stress there.
+        Kept nodes; None: all nodes on the surface that have stress.
     points
-        Rows of its stress points; None: all, unless nodes are chosen.
+        Rows of the stress points; None: all, or none if nodes are given.
 
     Raises
     ------
     FatigueError
-        If there are none, one does not exist, or the criterion needs a tangent plane that points have not.
+        If there are no places, one does not exist, or the criterion needs a tangent plane, which points do not have.
     """
     n_points = point_number(body)
     if nodes is None and n_points and body.stress is None:
@@ -94,19 +94,19 @@ def assessed_places(
         raise FatigueError(
             f'fatigue: criterion "{criterion.name}" with tensor = "{criterion.tensor}" needs the tangent plane of the '
             "surface, and stress points of elements have none; take signed-von-mises or principal with tensor = "
-            '"full", or look at nodes alone (outputs.places = "nodes")'
+            '"full", or assess only nodes (outputs.places = "nodes")'
         )
     named = [material for material in materials if material.nodes is not None or material.points is not None]
     rest = [material for material in materials if material.nodes is None and material.points is None]
     if len(rest) > 1:
-        raise FatigueError("fatigue: two materials name no places; expected one at most, which is that of the rest")
+        raise FatigueError("fatigue: two materials name no places; expected at most one, for all other places")
     has = [np.zeros(len(nodes), bool), np.zeros(len(points), bool)]
     members = {}
     for material in named:
         own = (material.nodes, material.points)
         mine = [np.isin(at, [] if of is None else of) for at, of in zip((nodes, points), own, strict=True)]
         if not (mine[0].any() or mine[1].any()):
-            raise FatigueError(f"fatigue: material {material.name!r}: none of its places is looked at")
+            raise FatigueError(f"fatigue: material {material.name!r}: none of its places is assessed")
         has = [a | b for a, b in zip(has, mine, strict=True)]
         members[id(material)] = mine
     for material in rest:

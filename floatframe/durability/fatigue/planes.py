@@ -19,7 +19,7 @@ def surface_nodes(body: ReducedBody) -> IntArray:
     """
     if body.stress is None:
         raise FatigueError(
-            f"body {body.name!r}: its modal file holds no stress of the modes at the nodes; reduce it again with "
+            f"body {body.name!r}: its modal file contains no stress of the modes at the nodes; reduce it again with "
             "stress = true in [reduction] of the job"
         )
     if len(body.surface):
@@ -30,8 +30,9 @@ def surface_nodes(body: ReducedBody) -> IntArray:
 def surface_frames(body: ReducedBody, nodes: IntArray) -> Array:
     """Return tangents e1, e2 and outward normal m at surface nodes as rows, in axes of B, (n, 3, 3).
 
-    m is the mean of the normals of the triangles about a node, weighted by their areas; e1 is the projection of the
-    axis of B that lies most in the tangent plane, e2 = m x e1. On a sharp edge m lies between its two faces.
+    m is the mean of the normals of the triangles about a node, weighted by their areas. e1 is the projection of the
+    axis of B with the smallest angle to the tangent plane, and e2 = m x e1. On a sharp edge, m is between the normals
+    of its faces.
 
     Raises
     ------
@@ -48,7 +49,7 @@ def surface_frames(body: ReducedBody, nodes: IntArray) -> Array:
     if not len(body.surface) or not (sizes > 0).all():
         which = "some nodes" if len(body.surface) else "its nodes"
         raise FatigueError(
-            f"body {body.name!r}: no surface about {which}, so that no tangent plane is known there; "
+            f"body {body.name!r}: no surface at {which}, so that there is no tangent plane; "
             'take criterion "signed-von-mises" or "principal" with tensor = "full"'
         )
     m = m / sizes[:, None]
@@ -76,9 +77,9 @@ def tensor_rows(frames: Array) -> Array:
 
 
 def normal_rows(frames: Array, n_planes: int) -> Array:
-    """Return the rows of normal stress on planes across the surface, n = cos a e1 + sin a e2, (n, n_planes, 6).
+    """Return the rows of normal stress on planes normal to the surface, n = cos a e1 + sin a e2, (n, n_planes, 6).
 
-    a = 0, pi/n_planes, ... below pi.
+    The angles are a = 0, pi/n_planes, ..., below pi.
     """
     n = in_tangent(frames, np.pi * np.arange(n_planes) / n_planes)
     return tensor_row(n, n)
@@ -87,9 +88,9 @@ def normal_rows(frames: Array, n_planes: int) -> Array:
 def shear_pairs(frames: Array, n_planes: int) -> tuple[Array, Array]:
     """Return rows of the resolved shear and of the normal stress on planes, each (n, 5 n_planes, 6).
 
-    Across the surface, n = cos a e1 + sin a e2, with the shear along the surface, s = m x n (n_planes of them); and at
-    45 degrees to it, n = (cos b e1 + sin b e2 + m) / sqrt(2) with b over the whole circle, with the shear in the plane
-    of n and m, and with that along the surface (2 n_planes each).
+    n_planes planes are normal to the surface, n = cos a e1 + sin a e2, with the shear along the surface, s = m x n.
+    2 n_planes planes are at 45 degrees to it, n = (cos b e1 + sin b e2 + m) / sqrt(2) with b over the full circle; each
+    has rows for the shear in the plane of n and m, and for the shear along the surface.
     """
     angles = np.pi * np.arange(2 * n_planes) / n_planes
     m = frames[:, None, 2]

@@ -32,12 +32,12 @@ def cycles_at(result: FatigueResult, blocks: Sequence[LoadBlock], place: int) ->
     Parameters
     ----------
     place
-        Index into the arrays of the result; of planes, the one of greatest damage is taken.
+        Index into the arrays of the result; the plane is that with the largest damage.
 
     Raises
     ------
     FatigueError
-        For criteria of shear, whose cycles carry a normal stress besides.
+        For criteria of shear, whose cycles also have a normal stress.
     """
     criterion, body = result.criterion, result.body
     if criterion.is_shear or result.is_spectral:
@@ -94,7 +94,7 @@ def fatigue_document(made: Assessment) -> Document:
         [section for section in sections if section is not None],
         record["body"],
         "fatigue",
-        footer="Written by floatframe fatigue. The same numbers stand in the JSON and CSV files beside this page.",
+        footer="Written by floatframe fatigue. The JSON and CSV files beside this page contain the same numbers.",
     )
 
 
@@ -134,8 +134,8 @@ def picture_section(made: Assessment) -> Section | None:
     if drawn is None:
         return None
     words = (
-        "Damage on the surface, in powers of ten; numbers are ranks of the table below. Nodes that were left out lie "
-        "below the scale; a stress point is shown at the node nearest to it, the worst of several."
+        "Damage on the surface, in powers of ten; numbers are ranks in the table below. Nodes that were not counted "
+        "are below the scale. A stress point is shown at the nearest node, which has the largest of several values."
     )
     return Section("surface", "Where it fails", (Picture(drawn),), words, "Surface")
 
@@ -174,12 +174,12 @@ def curve_section(made: Assessment, record: dict[str, Any]) -> Section:
         S = np.geomspace(curve.greatest, low, 240)
         S = S[curve.life(S) <= MOST_CYCLES]
         lines.append(Line(curve.life(S), S, f"S-N curve {material.name}".strip(), color))
-    words = "S-N curves as they were used, with their factors, in units of the body."
+    words = "S-N curves with their factors, in units of the body."
     if made.blocks and not made.result.criterion.is_shear and record["worst"]:
         cycles = cycles_at(made.result, made.blocks, int(made.result.worst()[0]))
         name = f"{record['worst'][0]['place']}: cycles of at least this amplitude"
         lines.append(Line(*exceedances(cycles), name, "#D55E00"))
-        words += " Beside it the equivalent amplitudes of the worst place in one programme, mean stress included."
+        words += " Also shown: equivalent amplitudes at the worst place in one programme, including mean stress."
     upwards = Axis(f"stress amplitude [{unit}]", is_log=True)
     chart = Chart(Axis("cycles", is_log=True), (upwards,), tuple(lines), 380)
     return Section("curve", "S-N curve and load spectrum", (Figure("sn", chart, words),), "", "S-N curve")
@@ -202,7 +202,7 @@ def method_section(record: dict[str, Any]) -> Section:
         *(("note", note) for note in record["notes"]),
     ]  # fmt: skip
     cells = [[Cell(name, "name"), Cell(words)] for name, words in rows]
-    return Section("method", "What it rests on", (TextTable(["", ""], cells),), "", "Method")
+    return Section("method", "Assumptions", (TextTable(["", ""], cells),), "", "Method")
 
 
 def curve_words(material: dict[str, Any], unit: str) -> str:

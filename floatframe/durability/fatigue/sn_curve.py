@@ -14,9 +14,9 @@ __all__ = ["BELOW", "LEAST_CYCLES", "SNCurve", "basquin_curve", "normal_quantile
 
 #: damage of cycles below the last point of a curve, by name
 BELOW = {
-    "limit": "no damage (fatigue limit; Miner's rule as it was)",
-    "haibach": "the slope k goes on as 2k - 1",
-    "elementary": "the slope goes on",
+    "limit": "no damage (fatigue limit; original Miner's rule)",
+    "haibach": "the slope k changes to 2k - 1",
+    "elementary": "the slope k continues",
 }
 LEAST_CYCLES = 1000.0  #: first number of cycles of a curve given by a slope; fewer cycles are low-cycle fatigue
 
@@ -27,9 +27,9 @@ LEAST_CYCLES = 1000.0  #: first number of cycles of a curve given by a slope; fe
 class SNCurve:
     """Cycles to failure at constant amplitude: N = N_j (S / S_j)^(-k_j) for S between the corners j + 1 and j.
 
-    S is the stress amplitude, half the range, in stress units of the body. Line j holds from amplitude `bottom[j]` up
-    to that of the line before. Below the last line there is no damage. Above `greatest` the curve was never measured:
-    cycles there are counted on the first line and told, or refused.
+    S is the stress amplitude, half the range, in stress units of the body. Line j holds from the amplitude `bottom[j]`
+    up to `bottom[j - 1]`. Below the last line there is no damage. Above `greatest` the curve was not measured: cycles
+    there are refused, or counted on the first line with a note.
 
     Parameters
     ----------
@@ -62,16 +62,16 @@ class SNCurve:
             object.__setattr__(self, name, frozen(getattr(self, name)))
         n = len(self.amplitude)
         if n == 0 or any(getattr(self, name).shape != (n,) for name in ("cycles", "slope", "bottom")):
-            raise FatigueError("S-N curve: expected as many slopes, cycles and least amplitudes as amplitudes")
+            raise FatigueError("S-N curve: expected one slope, number of cycles and least amplitude for each amplitude")
         if not (np.isfinite(self.amplitude).all() and (self.amplitude > 0).all() and (self.cycles > 0).all()):
             raise FatigueError("S-N curve: expected amplitudes and cycles above 0")
         if not (np.isfinite(self.slope).all() and (self.slope >= 1).all()):
             raise FatigueError(
-                f"S-N curve: expected slopes k of 1 or more, N ~ S^-k, got {least_words(self.slope)}; a table must "
-                "fall, with more cycles at less stress"
+                f"S-N curve: expected slopes k of 1 or more, N ~ S^-k, got {least_words(self.slope)}; in a table "
+                "the amplitudes must decrease with the cycles"
             )
         if (np.diff(self.bottom) >= 0).any() or self.bottom[-1] < 0:
-            raise FatigueError("S-N curve: expected least amplitudes that fall from line to line")
+            raise FatigueError("S-N curve: expected least amplitudes that decrease from line to line")
         steps = [self.line(j, self.bottom[j]) - self.line(j + 1, self.bottom[j]) for j in range(n - 1)]
         if any(step < -1e-9 * self.line(j, self.bottom[j]) for j, step in enumerate(steps)):
             raise FatigueError("S-N curve: expected lines that meet, or fewer cycles above a corner than below it")
@@ -80,7 +80,7 @@ class SNCurve:
 
     @property
     def mean_over_amplitude(self) -> float:
-        """Mean stress over amplitude of the tests: (1 + R) / (1 - R)."""
+        """Mean stress divided by amplitude in the tests: (1 + R) / (1 - R)."""
         return (1 + self.stress_ratio) / (1 - self.stress_ratio)
 
     @property
@@ -156,7 +156,7 @@ def basquin_curve(
     stress_ratio: float = -1.0,
     least_cycles: float = LEAST_CYCLES,
 ) -> SNCurve:
-    """Return the curve through a knee: slope k above it, below it a second slope, or what `below` says.
+    """Return the curve through a knee, with slope k above it, and a second slope or `below` below it.
 
     N = cycles (S / amplitude)^-k (Basquin 1910); amplitude is half the range.
 
@@ -167,18 +167,18 @@ def basquin_curve(
     slope
         Exponent k above the knee, positive.
     second_slope
-        Slope below the knee, which goes on without end; then `below` is not looked at.
+        Slope below the knee, without a fatigue limit; `below` is then ignored.
     below
         One of `BELOW`.
     stress_ratio
         Ratio R of the smallest to the largest stress in the tests of the curve.
     least_cycles
-        Where the curve begins; cycles of greater amplitude are out of its range.
+        Number of cycles at which the curve begins; cycles of larger amplitude are beyond the curve.
 
     Raises
     ------
     FatigueError
-        If a number is not possible.
+        If a number is out of range.
     """
     for name, value in (("amplitude", amplitude), ("cycles", cycles), ("least_cycles", least_cycles)):
         if not (math.isfinite(value) and value > 0):
@@ -204,7 +204,7 @@ def basquin_curve(
 def table_curve(
     cycles: Sequence[float], amplitudes: Sequence[float], *, below: str = "elementary", stress_ratio: float = -1.0
 ) -> SNCurve:
-    """Return the curve through points, straight in log S over log N; beyond the last point as `below` says.
+    """Return the curve through points, linear in log S over log N; `below` continues it beyond the last point.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def table_curve(
     Raises
     ------
     FatigueError
-        If there are fewer than two points, or they do not fall; with the place.
+        If there are fewer than two points, or the amplitudes do not decrease; the message names the point.
     """
     N, S = np.asarray(cycles, dtype=float), np.asarray(amplitudes, dtype=float)
     if N.ndim != 1 or N.shape != S.shape or len(N) < 2:

@@ -1,7 +1,7 @@
 """Damage and life of the places of a body, from histories or spectra of its modal coordinates.
 
 Places are the nodes of its surface and its stress points, each with its material. Materials are counted one after the
-other; what is found at one says what is negligible at the next.
+other; the largest damage found so far determines which places of the next material are negligible.
 """
 
 from collections.abc import Callable, Sequence
@@ -179,31 +179,31 @@ def history_damage(
     blocks
         Modal histories of the body, each with its repeats.
     curve
-        In stress units of the body; amplitudes, not ranges. None: only places that `others` name are looked at.
+        S-N curve in stress units of the body; amplitudes, not ranges. None: only places named by `others` are assessed.
     others
-        Materials of the places that they name, in place of `curve` and `mean_stress`; one without places is that of
-        the rest, in place of `curve`.
+        Materials that replace `curve` and `mean_stress` at the places that they name; a material without places
+        applies to all other places.
     criterion
         Scalar that is counted at a place, from the stress there.
     mean_stress
         Correction for the mean stress of a cycle.
     residue
-        "repeat": a block follows itself without end; "half": what is left counts as half cycles (ASTM E1049).
+        "repeat": each block is repeated endlessly; "half": the residue counts as half cycles (ASTM E1049).
     negligible
-        Places whose damage is proved to be below this share of the greatest are left out; 0: none.
+        Places whose damage is proved to be below this share of the largest damage are excluded; 0: none.
     extrapolate
-        Whether cycles beyond the greatest amplitude of the curve are counted (and told); else they are refused.
+        Whether cycles beyond the largest amplitude of the curve are counted, with a note; otherwise they are refused.
     nodes
-        Kept nodes to look at; None: all on the surface.
+        Kept nodes to assess; None: all on the surface.
     points
-        Stress points to look at; None: all, none if `nodes` are given.
+        Stress points to assess; None: all, or none if `nodes` are given.
     progress
         Called with the fraction of the work done, 0 to 1.
 
     Raises
     ------
     FatigueError
-        If the body has no stress, blocks do not fit it, or stresses leave the curve or reach the strength.
+        If the body has no stress, blocks do not fit the body, or stresses are beyond the curve or reach the strength.
     """
     materials = all_materials(curve, mean_stress, others)
     places = assessed_places(body, materials, nodes, points, criterion)
@@ -277,14 +277,14 @@ def spectral_damage(
     mean_stress
         Correction for the static mean stress.
     extrapolate
-        Whether damage beyond the greatest amplitude of the curve may be more than a hundredth of all.
+        Whether the damage beyond the largest amplitude of the curve may exceed a hundredth of the total.
     nodes
-        Kept nodes to look at; None: all on the surface.
+        Kept nodes to assess; None: all on the surface.
     points
-        Stress points to look at; None: all, none if `nodes` are given.
+        Stress points to assess; None: all, or none if `nodes` are given.
     stress
-        Stress at the kept nodes, then at the stress points if these are looked at, in axes of B over the coordinates
-        of the spectra, (n, 6, n_q) [Pa per unit]; None: of the modes of the body.
+        Stress at the kept nodes, then at the assessed stress points, in axes of B for the coordinates of the spectra,
+        (n, 6, n_q) [Pa per unit]; None: stress of the modes of the body.
     progress
         Called with the fraction of the work done, 0 to 1.
     """
@@ -307,7 +307,7 @@ def spectral_damage(
         worst = int(rows[np.argmax(share)])
         if share.max() > MOST_BEYOND:
             words = (
-                f"{share.max():.1%} of the damage at {place_words(body, places, worst)} is of amplitudes beyond the "
+                f"{share.max():.1%} of the damage at {place_words(body, places, worst)} has amplitudes beyond the "
                 f"S-N curve, which is known up to {material.curve.greatest:.6g} {body.units.stress_symbol}"
             )
             if not extrapolate:
@@ -416,7 +416,7 @@ def result_of(
     """Return the result for a body."""
     told = list(notes)
     if places.n_left_out:
-        told.append(f"{places.n_left_out} {what_places(places)} were not looked at: no material names them")
+        told.append(f"{places.n_left_out} {what_places(places)} were not assessed: no material names them")
     if (places.points != NONE).any() and "stress points" in body.provenance:
         told.append(f"stress points: {body.provenance['stress points']}")
     return FatigueResult(

@@ -1,12 +1,12 @@
 """Compiled functions: cycles of streamed histories by the four-point rule, and the damage of each cycle.
 
-The four-point rule: of four turning points in a row x1 x2 x3 x4 the inner two are a closed cycle if their range is no
-larger than both outer ones; they are taken out and the rest goes on. What is left at the end, the residue, spreads and
-then narrows; its ranges count as half cycles, which gives the counts of ASTM E1049-85 (rainflow), or the residue is
-followed by itself once more, which gives those of the history repeated without end.
+The four-point rule: of four successive turning points x1 x2 x3 x4, the inner two are a closed cycle if their range is
+not larger than either of the adjacent ranges. They are removed, and the rule continues with the other points. The
+residue at the end first widens and then narrows. Its ranges count as half cycles, which gives the counts of ASTM
+E1049-85 (rainflow); or the residue is appended to itself once, which gives the counts of an endlessly repeated history.
 
-A node carries its residue from chunk to chunk in a stack whose top is the last turning point so far: it moves on while
-the history goes on in its direction, so that cycles close as soon as they are passed.
+The residue of a node is kept from chunk to chunk in a stack whose top is the last turning point. The top moves while
+the history continues in the same direction, so that cycles close as soon as the history passes them.
 """
 
 from typing import NamedTuple
@@ -121,9 +121,9 @@ def damage_of(rule, S):
 
 @compiled
 def sums_of_reversals(rule, levels, sizes, weights, out):
-    """out_l = sum_i weights_i d(levels_l sizes_i), d the damage of a reversed cycle of that amplitude, (n_levels,).
+    """Write out_l = sum_i weights_i d(levels_l sizes_i), (n_levels,), with the damage d of a reversed cycle.
 
-    Infinite where an amplitude reaches the strength of the law for mean stress.
+    It is infinite if an amplitude reaches the strength of the mean stress law.
     """
     has_strength = rule.law in (LINE, GERBER)
     for level in range(levels.size):
@@ -171,7 +171,7 @@ def close(stack, depth, s, closed):
 def push(values, first, stack, depth, closed):
     """Stream values from index `first` into a stack until cycles close; return next index, depth, number of cycles.
 
-    The ends of those cycles stand in the rows of `closed`, (n, 2).
+    The turning points of these cycles are in the rows of `closed`, (n, 2).
     """
     i = first
     while depth < 2 and i < values.size:
@@ -210,11 +210,11 @@ def push_block(rule, values, stack, depths, closed, damage, counts, largest):
     values
         (n_nodes, n_times).
     stack
-        (n_nodes, n) with n above n_times and the greatest depth together.
+        Working array, (n_nodes, n), where n is larger than n_times plus the largest depth.
     closed
-        Scratch, (n, 2).
+        Working array, (n, 2).
     damage, counts, largest
-        Sums of the nodes, (n_nodes,), (n_nodes, 2), and the largest equivalent amplitude, (n_nodes,).
+        Sums for each node, (n_nodes,) and (n_nodes, 2), and the largest equivalent amplitude, (n_nodes,).
     """
     for n in range(values.shape[0]):
         depth, row, history, i = depths[n], stack[n], values[n], 0

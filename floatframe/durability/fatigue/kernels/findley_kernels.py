@@ -1,8 +1,8 @@
 """Compiled functions: cycles of the shear stress on a plane, with the largest normal stress during each cycle.
 
-The four-point rule of `cycle_kernels`, with a second stack: the largest normal stress since the turning point before.
-A cycle x2 x3 that closes on the way to x4 takes the largest of the ranges x2 to x3 and x3 to x4: the time until it
-closes and, where the history has gone on since, a little more, which is on the safe side.
+The four-point rule of `cycle_kernels`, with a second stack for the largest normal stress since the previous turning
+point. A cycle x2 x3 that closes between x3 and x4 takes the largest normal stress between x2 and x4. This includes some
+time after the cycle has closed, which is conservative.
 """
 
 import numpy as np
@@ -32,7 +32,7 @@ def count_findley(rule, k, weight, x, y, normal, damage, counts, largest, n):
 def push_findley(rule, k, shear, normal, stack, most, depths, damage, counts, largest):
     """Stream shear and normal stress on planes, (n_planes, n_times), into stacks, and count the cycles that close.
 
-    most, as stack (n_planes, n): largest normal stress from the turning point before to this one.
+    most: stack, (n_planes, n), of the largest normal stress between the previous turning point and this one.
     """
     for n in range(shear.shape[0]):
         depth, row, high = depths[n], stack[n], most[n]

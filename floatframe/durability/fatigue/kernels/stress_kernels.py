@@ -1,6 +1,6 @@
 """Compiled functions: signed scalars of histories of stress tensors.
 
-Components xx yy zz yz xz xy. Loops run over time without branches, so that they become vector instructions.
+The components are xx yy zz yz xz xy. Loops over time have no branches, so that they become vector instructions.
 """
 
 import numpy as np
@@ -13,10 +13,10 @@ compiled = njit(cache=True, nogil=True, error_model="numpy")
 
 @compiled
 def signed_von_mises(stress, out):
-    """Von Mises stress with the sign of the principal stress of largest size, (n, 6, n_t) -> (n, n_t).
+    """Von Mises stress with the sign of the principal stress of largest absolute value, (n, 6, n_t) -> (n, n_t).
 
-    The sign is that of s_1 + s_3, the middle one of the sums s_1 + s_2 >= s_1 + s_3 >= s_2 + s_3, the roots of
-    x³ - e1 x² + e2 x - e3 with e1 = 2 I1, e2 = I1² + I2, e3 = I1 I2 - I3. All are real, so that by Descartes' rule the
+    This is the sign of s_1 + s_3, the middle one of s_1 + s_2 >= s_1 + s_3 >= s_2 + s_3, which are the roots of x³ - e1
+    x² + e2 x - e3 with e1 = 2 I1, e2 = I1² + I2, e3 = I1 I2 - I3. All roots are real, so that by Descartes' rule the
     middle one is not negative if e3 >= 0 and e1, e2 > 0, or e3 < 0 and not (e1 < 0 and e2 > 0).
     """
     for n in range(stress.shape[0]):
@@ -36,9 +36,10 @@ def signed_von_mises(stress, out):
 
 @compiled
 def largest_principal(stress, out):
-    """The principal stress of largest size, (n, 6, n_t) -> (n, n_t).
+    """The principal stress of largest absolute value, (n, 6, n_t) -> (n, n_t).
 
-    p + 2 r cos(phi), p + 2 r cos(phi + 2 pi/3) with p = I1/3, r² = s:s/6, cos 3 phi = det s / (2 r³), s the deviator.
+    It is p + 2 r cos(phi) or p + 2 r cos(phi + 2 pi/3), with p = I1/3, r² = s:s/6, cos 3 phi = det s / (2 r³) and the
+    deviator s.
     """
     for n in range(stress.shape[0]):
         for t in range(stress.shape[2]):
@@ -65,7 +66,7 @@ def plane_von_mises(stress, out):
 
 @compiled
 def plane_principal(stress, out):
-    """The principal stress of largest size of stress in a plane, components xx yy xy, (n, 3, n_t) -> (n, n_t)."""
+    """The principal stress of largest absolute value in plane stress, components xx yy xy, (n, 3, n_t) -> (n, n_t)."""
     for n in range(stress.shape[0]):
         for t in range(stress.shape[2]):
             xx, yy, xy = stress[n, 0, t], stress[n, 1, t], stress[n, 2, t]

@@ -36,7 +36,7 @@ class ModalSpectra:
     duration
         Duration of one pass [s].
     mean
-        Static modal coordinates, (n_q,); None: zero.
+        Constant part of the modal coordinates, (n_q,); None: zero.
     repeats
         How often the load is repeated.
     scale
@@ -70,7 +70,7 @@ class ModalSpectra:
         if f[0] < 0 or not (np.diff(f) > 0).all():
             i = int(np.argmin(np.diff(f)))
             raise FatigueError(
-                f"{where}: expected frequencies from 0 up that rise, got {f[i]:.6g} and then {f[i + 1]:.6g} Hz"
+                f"{where}: expected increasing frequencies from 0 on, got {f[i]:.6g} and then {f[i + 1]:.6g} Hz"
             )
         largest = np.abs(G).max()
         defect = np.abs(G - G.conj().transpose(0, 2, 1)).max()
@@ -81,8 +81,8 @@ class ModalSpectra:
         if lowest.min() < -HERMITIAN * largest:
             i = int(np.argmin(lowest))
             raise FatigueError(
-                f"{where}: at {f[i]:.6g} Hz the cross spectra have the eigenvalue {lowest[i]:.3g}: power below zero; "
-                "some combination of the modes would have a negative spectrum"
+                f"{where}: at {f[i]:.6g} Hz the cross spectra have the eigenvalue {lowest[i]:.3g}; expected 0 or "
+                "more, otherwise a combination of the modes has a negative spectrum"
             )
         if self.mean is not None:
             object.__setattr__(self, "mean", frozen(self.mean))
@@ -91,7 +91,7 @@ class ModalSpectra:
         if self.weights is not None:
             object.__setattr__(self, "weights", frozen(self.weights))
             if self.weights.shape != f.shape or not (np.isfinite(self.weights).all() and (self.weights >= 0).all()):
-                raise FatigueError(f"{where}: weights: expected {len(f)} numbers of 0 or more, one a frequency")
+                raise FatigueError(f"{where}: weights: expected {len(f)} numbers of 0 or more, one per frequency")
         for name in ("duration", "repeats"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
@@ -103,7 +103,7 @@ class ModalSpectra:
 def modal_moments(spectra: ModalSpectra, orders: Sequence[float] = ORDERS) -> Array:
     """Return the integrals of scale² f^m Re G over f, (n_orders, n_q, n_q).
 
-    A stress a . S q, a row of numbers a, has the spectral moments (a S) M_m (a S).T: the imaginary parts cancel.
+    For a row of numbers a, the stress a · S q has the spectral moments (a S) M_m (a S).T; imaginary parts cancel.
     """
     f, G = spectra.frequencies, spectra.spectra.real
     widths = np.zeros(len(f)) if spectra.weights is None else spectra.weights
@@ -125,14 +125,14 @@ def spectra_of_history(
     t, q
         Times at equal steps, (n_t,) [s], and modal coordinates, (n_t, n_q); their mean goes into `mean`.
     n_segment
-        Times of a segment; None: an eighth of all.
+        Number of times in a segment; None: an eighth of all.
     duration
-        How long the motion lasts; None: as long as the history [s].
+        Duration of the motion [s]; None: that of the history.
 
     Raises
     ------
     FatigueError
-        If the times are not at equal steps.
+        If the time steps are not equal.
     """
     from scipy.signal import csd
 

@@ -1,8 +1,8 @@
 """Damage from spectra of modal coordinates: spectral moments of each place, then a distribution of amplitudes.
 
-A stress that is linear in q, s = a · S q, has the moments (a S) M_m (a S).T, M_m of `modal_moments`. Von Mises stress
-is none; Preumont & Piéfort (1994) put in its place the Gaussian stress whose spectrum is the mean of that of its
-square, G(f) = trace(Q S G(f) S.T) with sigma_vM² = sigma.T Q sigma: its moments are trace(Q S M_m S.T).
+A stress that is linear in q, s = a · S q, has the moments (a S) M_m (a S).T, with M_m from `modal_moments`. Von Mises
+stress is not linear. Preumont & Piéfort (1994) replace it by a Gaussian stress with the same mean square and the
+spectrum G(f) = trace(Q S G(f) S.T), where sigma_vM² = sigma.T Q sigma; its moments are trace(Q S M_m S.T).
 """
 
 from collections.abc import Sequence
@@ -37,8 +37,8 @@ def count_spectra(
 ) -> Counted:
     """Return the damage of places with stress shapes (n, 6, n_q) [Pa per unit of q]; all places are counted.
 
-    `beyond` of the result is the damage beyond the greatest amplitude of the curve, over the whole; `largest` is three
-    standard deviations of the stress, largest over the spectra, plus the mean.
+    `beyond` of the result is the fraction of the damage beyond the largest amplitude of the curve; `largest` is three
+    standard deviations of the stress plus the mean, the largest over the spectra.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def check(
     if criterion.name in ("principal", "findley"):
         instead = '"normal"' if criterion.name == "principal" else '"shear"'
         raise FatigueError(
-            f'fatigue: criterion "{criterion.name}" is not linear in the stress, so that spectra do not give it; take '
+            f'fatigue: criterion "{criterion.name}" is not linear in the stress, so that it has no spectrum; take '
             f'{instead}, over planes, or "signed-von-mises" (Preumont\'s equivalent stress)'
         )
     if mean_stress.law not in (NONE, LINE, GERBER):
@@ -135,7 +135,7 @@ def linear_rows(stress: Array, frames: Array | None, criterion: Criterion) -> Ar
         return rows
     if criterion.tensor == "full":
         return np.asarray(criterion.norm_root() @ rows)
-    # xx² + yy² - xx yy + 3 xy² = |A (xx, yy, xy)|²
+    # sigma_vM² = xx² + yy² - xx yy + 3 xy² = |A (xx, yy, xy)|²
     A = np.array([[1.0, -0.5, 0.0], [0.0, np.sqrt(0.75), 0.0], [0.0, 0.0, np.sqrt(3.0)]])
     return np.asarray(A @ rows)
 

@@ -1,9 +1,10 @@
 """Distributions of the cycle amplitudes of a stationary Gaussian stress, from its spectral moments.
 
-With moments l_m = int f^m G df, up-crossings of the mean nu_0 = sqrt(l_2 / l_0) and peaks nu_p = sqrt(l_4 / l_2) a
-second, a_1 = l_1 / sqrt(l_0 l_2) and a_2 = l_2 / sqrt(l_0 l_4), every method here but Wirsching and Light's is a sum of
-densities b x^(b-1) / theta^b exp(-(x / theta)^b) of the amplitude x (b = 1 exponential, 2 Rayleigh, else Weibull), each
-with a rate of cycles. Damage on a straight line of the S-N curve is then an incomplete gamma function:
+The moments l_m = int f^m G df give the rates of up-crossings of the mean nu_0 = sqrt(l_2 / l_0) and of peaks
+nu_p = sqrt(l_4 / l_2), a_1 = l_1 / sqrt(l_0 l_2) and a_2 = l_2 / sqrt(l_0 l_4). Every method except Wirsching and
+Light's is a sum of densities b x^(b-1) / theta^b exp(-(x / theta)^b) of the amplitude x (b = 1: exponential, 2:
+Rayleigh, otherwise Weibull), each with a rate of cycles. The damage on a straight line of the S-N curve is then an
+incomplete gamma function:
 
     int_lo^hi x^k p dx = theta^k [gamma(1 + k/b, (hi/theta)^b) - gamma(1 + k/b, (lo/theta)^b)].
 """
@@ -133,14 +134,14 @@ def wirsching_light_factor(moments: Array, curve: SNCurve) -> Array:
 def damage_rates(
     moments: Array, curve: SNCurve, method: str, factor: Array | float = 1.0
 ) -> tuple[Array, Array, Array]:
-    """Return damage a second, the part of it beyond the greatest amplitude of the curve, and cycles a second, (n,).
+    """Return the damage per second, its part beyond the largest amplitude of the curve, and cycles per second, (n,).
 
     Parameters
     ----------
     moments
         Spectral moments of orders 0, 1, 2, 4 in Hz, (4, n) [Pa² Hz^m].
     factor
-        On all amplitudes, such as that of a mean stress, (n,) or one.
+        Factor on all amplitudes, such as that of a mean stress, (n,) or one number.
 
     Raises
     ------

@@ -58,7 +58,7 @@ def test_size_and_reliability_are_those_of_the_textbook():
     ("call", "message"),
     [
         (lambda: roughness_factor(600, 1e4), "expected 0 to 500 micrometres"),
-        (lambda: roughness_factor(6e8, 10), "expected 200 to 3000 MPa of steel, got 6e\\+08; look at its unit"),
+        (lambda: roughness_factor(6e8, 10), "expected 200 to 3000 MPa of steel, got 6e\\+08; check its unit"),
         (lambda: roughness_factor(600, 10, "stel"), "unknown group 'stel'.*'steel'"),
         (lambda: technological_size_factor(30, "steel"), "unknown group 'steel'"),
         (lambda: technological_size_factor(0, "cast-steel"), "above 0"),

@@ -80,8 +80,8 @@ def test_a_node_of_two_materials_is_a_place_of_each_and_places_of_none_are_told(
     found = history_damage(mast, [block(mast)], None, others=materials, negligible=0, extrapolate=True)
     assert found.nodes.tolist() == [*nodes[:4], *nodes[2:]]
     n_others = len(np.unique(mast.surface)) + len(mast.point_stress.names) - 6
-    assert any(f"{n_others} nodes were not looked at" in note for note in found.notes)
-    with pytest.raises(FatigueError, match="material 'none': none of its places is looked at"):
+    assert any(f"{n_others} nodes were not assessed" in note for note in found.notes)
+    with pytest.raises(FatigueError, match="material 'none': none of its places is assessed"):
         history_damage(mast, [block(mast)], CURVE, others=[FatigueMaterial(WEAK, name="none", nodes=nodes[:0])])
     with pytest.raises(FatigueError, match="expected an S-N curve, or others"):
         history_damage(mast, [block(mast)], None)
@@ -159,7 +159,7 @@ def test_places_are_nodes_or_points_as_asked(folder, mast):
 @pytest.mark.parametrize(
     ("where", "message"),
     [
-        ("", "expected the places that have it: sets, elements, nodes or points"),
+        ("", "expected the places of the material: sets, elements, nodes or points"),
         ('sets = ["TOP"]', "no set 'TOP'"),
         ("elements = [99]", "no element 99 behind the surface"),
         ('points = ["beam 99"]', "no stress point 'beam 99'"),

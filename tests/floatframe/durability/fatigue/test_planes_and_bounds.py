@@ -214,7 +214,7 @@ def test_a_mean_at_the_strength_has_no_bound():
     [
         ({"residue": "open"}, "residue: unknown 'open'"),
         ({"negligible": 1.0}, "share from 0 to below 1"),
-        ({"criterion": Criterion("findley"), "mean_stress": MeanStress("swt")}, "normal stress in itself"),
+        ({"criterion": Criterion("findley"), "mean_stress": MeanStress("swt")}, "contains the normal stress"),
         ({"blocks": []}, "one load block"),
         ({"blocks": [LoadBlock("road", np.zeros((3, 2)))]}, "2 modal coordinates, but stress shapes of 4"),
     ],

@@ -63,9 +63,9 @@ def test_damage_of_a_random_test_grows_with_its_duration_and_adds_its_directions
     assert both.block_names == ("noise left:x", "noise left:z")
     assert_allclose(both.damage, 0.5 * (each[0].damage + each[1].damage), rtol=1e-12)
     assert both.damage.max() > 0
-    with pytest.raises(FatigueError, match="how long it lasts is not known"):
+    with pytest.raises(FatigueError, match="its duration is not known"):
         shaken_damage(body, result.model, replace(test, duration=None), result.random, curve)
-    with pytest.raises(FatigueError, match="no run of it was made"):
+    with pytest.raises(FatigueError, match="expected one of its runs"):
         shaken_damage(body, result.model, replace(test, name="other"), result.random, curve)
 
 

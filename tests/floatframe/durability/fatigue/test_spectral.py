@@ -178,8 +178,8 @@ EYE = np.broadcast_to(np.eye(2), (3, 2, 2))
     ("make", "words"),
     [
         (lambda: ModalSpectra("a", [1, 2, 2], EYE, 1.0), "got 2 and then 2 Hz"),
-        (lambda: ModalSpectra("a", [-1, 2, 3], EYE, 1.0), "from 0 up"),
-        (lambda: ModalSpectra("a", [1, 2, 3], EYE * np.array([1, -1]), 1.0), "power below zero"),
+        (lambda: ModalSpectra("a", [-1, 2, 3], EYE, 1.0), "from 0 on"),
+        (lambda: ModalSpectra("a", [1, 2, 3], EYE * np.array([1, -1]), 1.0), "expected 0 or more"),
         (lambda: ModalSpectra("a", [1, 2, 3], EYE + np.array([[0, 1], [0, 0]]), 1.0), "conj"),
         (lambda: ModalSpectra("a", [1, 2, 3], EYE * math.nan, 1.0), "NaN"),
         (lambda: ModalSpectra("a", [1, 2, 3], EYE[:2], 1.0), r"got \(3,\) and \(2, 2, 2\)"),
