@@ -47,7 +47,7 @@ def shake_document(result: ShakeResult) -> Document:
     sections += [time_section(result, run, k) for k, run in enumerate(result.time)]
     sections.append(method_section(result))
     facts, answer = head(result)
-    footer = "Written by floatframe shake. The same numbers stand in the JSON and CSV files beside this page."
+    footer = "Written by floatframe shake. The JSON and CSV files beside this page contain the same numbers."
     return Document(title, facts, answer, sections, result.model.name, "base shaking", footer=footer)
 
 
@@ -93,7 +93,7 @@ def sentence(result: ShakeResult) -> str:
     if reasons:
         said += f" Inputs are notched for: {', '.join(sorted(reasons))}."
     elif result.notched:
-        said += " No limit is reached: nothing is notched."
+        said += " No limit is reached, so that no input is notched."
     if result.notes:
         said += f" {len(result.notes)} note{'s' if len(result.notes) > 1 else ''} below."
     return said
@@ -170,12 +170,12 @@ def mass_section(result: ShakeResult) -> Section:
     totals = [Cell(""), Cell("total", "name"), Cell("")] + [Cell(number(float(v)), "n") for v in masses.total]
     rows.append(totals)
     more = len(masses.frequencies) - MOST_MODES
-    after = [Paragraph(f"{more} more modes stand in the JSON file.")] if more > 0 else []
+    after = [Paragraph(f"{more} more modes are in the JSON file.")] if more > 0 else []
     chart = Figure(
         "masses",
         mass_chart(masses),
-        "Effective mass of all modes up to a frequency, over that of the rigid structure; what is missing at the end "
-        "rides on the base or vibrates above the last mode.",
+        "Effective mass of all modes up to a frequency, relative to the mass of the rigid structure. The rest moves "
+        "rigidly with the base or vibrates above the last mode.",
         "Cumulative effective mass",
     )
     unit = f"{result.model.units.mass_symbol}, {result.model.units.mass_symbol} {result.model.units.length_symbol}²"
@@ -183,7 +183,7 @@ def mass_section(result: ShakeResult) -> Section:
         "masses-section",
         "Modes with the base held",
         (chart, TextTable(["mode>", "Hz>", "damping>", *(f"{name} [%]>" for name in names)], rows), *after),
-        "Share of mass and inertia that each mode moves against the base, and its cumulative sum; totals in "
+        "Effective mass and inertia of each mode as a share of the total, and the cumulative sum; totals in "
         f"{unit}, about the point of the base.",
         "Effective masses",
     )
@@ -232,8 +232,8 @@ def sine_section(result: ShakeResult, run: SineRun, number_: int) -> Section:
     words += (
         ""
         if run.rate is None
-        else f", swept at {run.rate:g} octaves a minute: dotted, and in the column \u201cswept\u201d, with the "
-        "transient of the sweep"
+        else f", swept at {run.rate:g} octaves per minute (dotted, column \u201cswept\u201d: with the transient of "
+        "the sweep)"
     )
     return Section(
         key,
@@ -343,12 +343,12 @@ def miles_part(result: ShakeResult, run: RandomRun) -> list[Block]:
     ]
     headings = ["mode>", "Hz>", "share of mass [%]>", "Q>", "input [g²/Hz]>", "Miles [g rms]>"]
     words = (
-        f"Computed mean acceleration (net base force over mass): {rms:.4g} g rms. Miles takes one mode for the whole "
-        "mass and its density for all frequencies."
+        f"Computed mean acceleration (net base force divided by mass): {rms:.4g} g rms. Miles' estimate assumes one "
+        "mode with the whole mass and the same density at all frequencies."
     )
     return [
         Heading("Miles' equation"),
-        TextTable([*headings, "over the computed mean acceleration>"], rows),
+        TextTable([*headings, "relative to the computed mean acceleration>"], rows),
         Paragraph(words, "why"),
     ]
 
@@ -372,7 +372,7 @@ def time_section(result: ShakeResult, run: TimeRun, number_: int) -> Section:
     drawn = kind_charts(result, run, run.peaks, key, history_chart)
     blocks: list[Block] = [drawn]
     if run.spectra:
-        words = "Largest answer of single masses to the accelerations, during and after them."
+        words = "Largest response of single masses to the accelerations, during and after them."
         blocks.append(Figure(f"{key}-spectra", spectra_chart(result.model, run), words, "Shock response spectra"))
     rows = []
     for k in reported_rows(run.outputs, run.peaks):
@@ -388,7 +388,7 @@ def time_section(result: ShakeResult, run: TimeRun, number_: int) -> Section:
         )
     length, second = result.model.units.length_symbol, result.model.units.time_symbol
     left = "; ".join(
-        f"{name}: the base is left with {v:.4g} {length}/{second} and {d:.4g} {length}"
+        f"{name}: at the end the base has {v:.4g} {length}/{second} and {d:.4g} {length}"
         for name, v, d in zip(run.inputs, run.velocity_left, run.displacement_left, strict=True)
         if math.isfinite(v)
     )
@@ -409,15 +409,15 @@ def method_section(result: ShakeResult) -> Section:
     """Return the section with conventions, conversions and definitions."""
     terms = [
         ("units", "; ".join(conversions(result.model))),
-        ("base", "moved by its acceleration exactly: its interfaces are eliminated, no mass is added"),
+        ("base", "follows its acceleration exactly: its interfaces are eliminated, and no mass is added"),
         ("forces", "of the base on the structure, moments about the point of the base"),
-        ("mean acceleration", "net force of the base over the mass: quasi-static load factor of the centre of mass"),
+        ("mean acceleration", "net force of the base / mass: quasi-static load factor of the centre of mass"),
         ("displacement", "relative to the base"),
         (
             "von Mises",
             "sine: the largest value over a cycle; random: rms = sqrt tr(A Sigma), exact for Gaussian stress. The "
-            "stress itself is not Gaussian "
-            "and never negative, so 3 rms is no 99.73 % value: that one stands beside it (between 1.9 and 3 rms)",
+            "von Mises stress is not Gaussian and never negative, so that 3 rms is not its 99.73 % value; the table "
+            "also has this value (between 1.9 and 3 rms)",
         ),
         (
             "uncertainty",
@@ -426,9 +426,9 @@ def method_section(result: ShakeResult) -> Section:
         ),
         (
             "notches",
-            "the level, or what the limit allows if that is less, frequency by frequency; the reason is the limit "
-            "that allows least",
+            "the smaller of the level and the allowed input at each frequency; the reason is the limit that allows the "
+            "smallest input",
         ),
     ]
     lead = "Formulas and conventions are in docs/shake.md."
-    return Section("method", "What the numbers are", (Terms(terms),), lead, "Method")
+    return Section("method", "Definitions", (Terms(terms),), lead, "Method")

@@ -1,4 +1,4 @@
-"""A shake result as a record in plain types, also without its long curves, and as a table; accelerations are in g."""
+"""A shake result as a record in plain types, with or without long curves, and as a table; accelerations are in g."""
 
 from typing import Any
 
@@ -58,7 +58,7 @@ def conversions(model: ShakenModel) -> list[str]:
         f"1 g = 9.80665 m/s² = {model.gravity:.9g} {length}/{second}²; 1 g²/Hz = {model.gravity**2:.9g} "
         f"({length}/{second}²)²/Hz",
         "frequencies in Hz = 1/s" + (f"; the model's unit of time is {units.time:g} s" if units.time != 1 else ""),
-        "accelerations in g, all else in units of the model; forces are those of the base on the structure",
+        "accelerations in g, all others in units of the model; forces are those of the base on the structure",
     ]
     return said
 
@@ -255,7 +255,7 @@ def notched_record(model: ShakenModel, kind: str, run: NotchedRun) -> dict[str, 
 
 
 def table_rows(result: ShakeResult) -> list[tuple[Any, ...]]:
-    """Return one row for each output and run, with the columns `COLUMNS`; rounding errors of zero are left out."""
+    """Return one row for each output and run, with the columns `COLUMNS`; rounding errors are omitted."""
     model, rows = result.model, []
     for sine in result.sine:
         scale, keep = factors(model, sine.outputs), reported_rows(sine.outputs, sine.peaks)
@@ -349,15 +349,15 @@ def shake_table(result: ShakeResult) -> Table:
 def light_record(record: dict[str, Any], file_name: str) -> tuple[dict[str, Any], dict[str, Array]]:
     """Return the record without its curves, and the curves by their paths; unchanged if there are few numbers.
 
-    Curves are lists of more than 50 numbers, or of lists of more than 50. In the record {"array": "random/0/densities",
-    "shape": [12, 804]} stands for each, and "curves" says in which file they are.
+    Curves are lists of more than 50 numbers, or lists of such lists. In the record they are replaced by a reference
+    such as {"array": "random/0/densities", "shape": [12, 804]}, and "curves" names the file that contains them.
 
     Parameters
     ----------
     record
-        As `shake_record` returns it.
+        The record, from `shake_record`.
     file_name
-        Of the file of arrays (.npz).
+        Name of the file of arrays (.npz).
     """
     if sum(size_of_curves(value) for value in record.values()) <= MOST_NUMBERS:
         return record, {}

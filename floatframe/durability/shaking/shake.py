@@ -62,8 +62,8 @@ class ShakeJob:
     structure
         The shaken structure.
     base
-        What each base holds, by name of the base: interfaces of a body; joints, springs and bushings of a system. A
-        single name: the only base, which holds this; None: the only interface, or the ground.
+        The parts that each base holds, by name of the base: interfaces of a body; joints, springs and bushings of a
+        system. A single name is the part held by the only base; None: the only interface, or the ground.
     points
         Reference points of bases by name, coordinates of the mesh of a body or of the ground, (3,) [m].
     damping
@@ -164,7 +164,7 @@ class ShakeResult:
 def effective_masses(model: ShakenModel) -> EffectiveMasses:
     """Return the effective masses of all modes.
 
-    Those of the full model sum to the mass less what rides on the bases.
+    In the full model, their sum is the mass minus the mass that moves rigidly with the bases.
     """
     n_s = 6 * len(model.bases)
     return EffectiveMasses(
@@ -191,14 +191,14 @@ def shake(job: ShakeJob) -> ShakeResult:
         impossible.
     """
     if not (job.sine or job.random or job.shock):
-        raise ModelError("shake: no test is given: expected a sine, random, shock or transient test")
+        raise ModelError("shake: expected a sine, random, shock or transient test, got none")
     forces = [name for test in job.shock for name in (test.inputs or {}) if not is_base_input(job, name)]
     model = model_of(job, tuple(dict.fromkeys(forces)))
     notes: list[str] = list(model.notes)
     if job.residual_above is not None:
         model = with_static_modes(model, job.residual_above)
         notes.append(
-            f"{model.n_residual} of {len(model.omega)} modes are above {job.residual_above:g} Hz and answer statically"
+            f"{model.n_residual} of {len(model.omega)} modes are above {job.residual_above:g} Hz and respond statically"
         )
     masses = effective_masses(model)
     notes += mass_notes(masses)
@@ -244,9 +244,8 @@ def with_static_modes(model: ShakenModel, above: float) -> ShakenModel:
     n_residual = int((model.frequencies > above).sum())
     if n_residual == len(model.omega):
         raise ModelError(
-            f"shake: residual_above = {above:g} Hz lies below all modes (the first is at {model.frequencies[0]:.4g} "
-            "Hz): "
-            "nothing would vibrate"
+            f"shake: residual_above = {above:g} Hz is below all modes (the first is at {model.frequencies[0]:.4g} "
+            "Hz), so that no mode would vibrate"
         )
     return replace(model, n_residual=n_residual)
 
@@ -257,9 +256,8 @@ def mass_notes(masses: EffectiveMasses) -> list[str]:
         return []
     carried = masses.cumulative[-1][:3]
     return [
-        f"direction {name}: the modes carry {100 * share:.1f} % of the mass; what is left rides on the base, or "
-        "vibrates above "
-        "the last mode, and is in the forces rigidly"
+        f"direction {name}: the modes contain {100 * share:.1f} % of the mass; the rest moves rigidly with the base, "
+        "or vibrates above the last mode and is included in the forces as a rigid mass"
         for name, share in zip(masses.directions, carried, strict=False)
         if share < LITTLE_MASS
     ]

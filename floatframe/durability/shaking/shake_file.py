@@ -89,7 +89,7 @@ class BaseSection(Table):
 
     interface: str | None = Field(None, description="the interface that the base holds")
     interfaces: Names = Field((), description="the interfaces that the base holds, a list of names")
-    joints: Names = Field((), description="of a system: the joints, springs and bushings on the ground that it holds")
+    joints: Names = Field((), description="of a system: the joints, springs and bushings that the base moves")
     point: Vector3 | None = Field(None, description="the reference point, [x, y, z] in mesh coordinates")
 
     @model_validator(mode="after")
@@ -117,14 +117,14 @@ class DampingSection(Table):
     )
     modes: dict[str, float] = Field(default_factory=dict, description='ratios by mode number, { "1" = 0.02 }')
     own: bool = Field(False, description="true: the damping of the body or of the dampers of the system")
-    heavy: bool = Field(False, description="true or false: whether ratios above 0.2 are meant")
+    heavy: bool = Field(False, description="true or false: whether ratios above 0.2 are intended")
 
 
 class UncertaintySection(Table):
     """[uncertainty]."""
 
-    factor: float = Field(1.0, description="a number of 1 or more, on all responses")
-    frequency: float = Field(0.0, description="a share from 0 to 0.5 by which frequencies may be off")
+    factor: float = Field(1.0, description="a number of 1 or more, the factor on all responses")
+    frequency: float = Field(0.0, description="a share from 0 to 0.5, the relative uncertainty of frequencies")
     bands: Annotated[tuple[tuple[float, float, float, float], ...], BeforeValidator(rows_of(4))] = Field(
         (), description="rows [from Hz, to Hz, factor, share]"
     )
@@ -137,14 +137,14 @@ class OutputSection(Table):
     node: int | str | None = Field(None, description='the number of a node, or "INSTANCE.number"')
     element: int | str | None = Field(None, description="the number of an element: each of its kept nodes")
     set: str | None = Field(None, description="the name of a set: each of its kept nodes")
-    position: Vector3 | None = Field(None, description="the place of a kept node, [x, y, z] in mesh coordinates")
+    position: Vector3 | None = Field(None, description="the position of a kept node, [x, y, z] in mesh coordinates")
     point: str | None = Field(None, description="the name of a stress point")
     quantities: Names = Field((), description=f"a list of {', '.join(QUANTITIES)}")
     body: str | None = Field(None, description="of a system: the name of the body")
     sensor: str | None = Field(None, description="of a system: the name of one of its sensors")
     recovery: str | None = Field(None, description="of a body: the name of a recovery table in its modal file")
     tolerance: Annotated[float, Field(ge=0)] = Field(
-        TOLERANCE, description="a number of 0 or more: how far the node may be from position, of the size of the body"
+        TOLERANCE, description="a number of 0 or more: largest distance from position, relative to the body size"
     )
 
 
@@ -154,7 +154,7 @@ class SineSection(Table):
     level: Rows = Field(description=ROWS)
     unit: str = Field("g", description="the unit of the level: g, m/s2, mm (amplitude of the displacement), ...")
     directions: Names = Field(("x", "y", "z"), description="a list of x, y, z, rx, ry, rz, or base:x")
-    rate: float | None = Field(None, description="a number above 0, octaves a minute; none: steady at every frequency")
+    rate: float | None = Field(None, description="a number above 0, octaves per minute; default: steady")
     downward: bool = Field(False, description="true: from the last frequency to the first")
 
 
@@ -184,7 +184,7 @@ class RandomSection(Table):
     cross: Annotated[tuple[CrossSection, ...], BeforeValidator(as_tuple)] = Field(
         (), description="a list of { a, b, coherence, phase }"
     )
-    duration: float | None = Field(None, description="a number above 0, seconds, for the largest value to expect")
+    duration: float | None = Field(None, description="a number above 0, seconds, for the expected largest value")
 
 
 class ShockSection(Table):
@@ -194,19 +194,17 @@ class ShockSection(Table):
     amplitude: float | None = Field(None, description="a number, in unit")
     duration: float | None = Field(None, description="a number above 0, seconds")
     edge: float = Field(EDGE, description="a share up to 0.5, rise and fall of a trapezoid")
-    srs: Rows | None = Field(
-        None, description="rows [Hz, acceleration] of a shock response spectrum to be met, or a file"
-    )
+    srs: Rows | None = Field(None, description="rows [Hz, acceleration] of a target shock response spectrum, or a file")
     Q: float = Field(10.0, description="a number above 0.5, of that spectrum")
     shapes: choice("shapes", lambda: tuple(SHAPES)) = Field(  # type: ignore[valid-type]
-        "wavelets", description=f"what the history of a spectrum is made of, one of {', '.join(SHAPES)}"
+        "wavelets", description=f"the shapes whose sum is the history of a spectrum, one of {', '.join(SHAPES)}"
     )
     decay: float | None = Field(None, description="a ratio from 0.005 to 0.5, of damped sines")
     file: Annotated[Path, BeforeValidator(file_beside)] | None = Field(None, description="a file with a time history")
     column: str | None = Field(None, description="the name of the acceleration in the file")
     unit: str = Field("g", description="the unit of the acceleration")
     directions: Names = Field(("x", "y", "z"), description="a list of x, y, z, rx, ry, rz, or base:x")
-    after: float | None = Field(None, description="a number of 0 or more, seconds that are looked at after the end")
+    after: float | None = Field(None, description="a number of 0 or more, seconds computed after the end")
 
     @model_validator(mode="after")
     def _one_way(self) -> "ShockSection":
@@ -227,19 +225,19 @@ class TransientSection(Table):
         description="a file with time histories: .csv, .mat, .rsp"
     )
     time: str | None = Field(None, description="the name of the column of times; default: found by its name")
-    rate: float | None = Field(None, description="a number above 0, samples a second, where the file has no times")
+    rate: float | None = Field(None, description="a number above 0, samples per second, if the file has no times")
     inputs: dict[str, str] = Field(
         description='columns of the file by input: "base:x", "interface:x" (a force), "load case NAME"'
     )
     unit: str | None = Field(None, description="the unit of the accelerations; default: that of the file")
     force_unit: str | None = Field(None, description="the unit of the forces; default: that of the file")
-    after: float | None = Field(None, description="a number of 0 or more, seconds that are looked at after the end")
+    after: float | None = Field(None, description="a number of 0 or more, seconds computed after the end")
 
 
 class NotchSection(Table):
     """[notch.NAME]."""
 
-    of: str = Field(description="which tests: sine, random, sine.NAME or random.NAME")
+    of: str = Field(description="the tests to notch: sine, random, sine.NAME or random.NAME")
     output: str = Field(description='the name of an output, such as "mirror acceleration z" or "base force z"')
     level: float | None = Field(
         None, description="a number above 0, g or the unit of the output (squared per Hz of a random test)"
@@ -247,11 +245,11 @@ class NotchSection(Table):
     table: Rows | None = Field(None, description=ROWS)
     rms: float | None = Field(None, description="a number above 0, of random tests: g or the unit of the output")
     C: float | None = Field(None, description="a number above 0: the semi-empirical force limit")
-    frequency: float | None = Field(None, description="a number above 0, Hz, where the force limit begins to fall")
-    exponent: float = Field(2.0, description="a number of 0 or more, how fast it falls")
-    mass: float | None = Field(None, description="a number above 0, its mass; default: that of the structure")
-    factor: float = Field(1.0, description="a number above 0, on the response before it is compared")
-    deepest: float = Field(DEEPEST, description="a number above 0, dB, the deepest notch that is allowed")
+    frequency: float | None = Field(None, description="a number above 0, Hz, above which the force limit decreases")
+    exponent: float = Field(2.0, description="a number of 0 or more, the exponent of its decrease")
+    mass: float | None = Field(None, description="a number above 0, mass M_0; default: that of the structure")
+    factor: float = Field(1.0, description="a number above 0, the factor on the response before the comparison")
+    deepest: float = Field(DEEPEST, description="a number above 0, dB, the largest allowed depth of a notch")
 
     @field_validator("of")
     @classmethod
@@ -276,7 +274,7 @@ class SpectraSection(Table):
 class ModesSection(Table):
     """[modes]."""
 
-    residual_above: float | None = Field(None, description="a number above 0, Hz: modes above answer statically")
+    residual_above: float | None = Field(None, description="a number above 0, Hz: modes above it respond statically")
 
 
 class ShakeFile(Table):
@@ -308,7 +306,7 @@ class ShakeFile(Table):
             raise ValueError("expected either base or tables [bases.NAME], got both")
         if not (self.sine or self.random or self.shock or self.transient):
             raise ValueError(
-                "expected one table at least: [sine.NAME], [random.NAME], [shock.NAME] or [transient.NAME]"
+                "expected at least one table: [sine.NAME], [random.NAME], [shock.NAME] or [transient.NAME]"
             )
         return self
 
@@ -324,9 +322,9 @@ def read_shake(path: str | os.PathLike[str]) -> ShakeJob:
     Raises
     ------
     SystemFileError
-        With every problem: key path, value, what was expected, choices and the nearest name.
+        If the file is not valid; the message lists every problem, with key path, value, expected value and choices.
     ModelError
-        If a level, limit or place is none.
+        If a level, limit or place is not valid.
     """
     path = Path(path)
     data = validated(ShakeFile, read_toml(path, SystemFileError), path, SystemFileError, context=path.parent)
@@ -334,7 +332,7 @@ def read_shake(path: str | os.PathLike[str]) -> ShakeJob:
         structure: cms.ReducedBody | System = cms.read(data.body, units=data.units)
     else:
         if data.units is not None:
-            raise SystemFileError(f"{path}: units: of a modal file; a system file says its own")
+            raise SystemFileError(f"{path}: units: only for a modal file; a system file states its own units")
         structure, _ = read_system(str(data.system))
     try:
         return job_of(data, structure)
@@ -481,9 +479,9 @@ def transient_of(data: ShakeFile, name: str, spectra: SpectrumRequest) -> TimeTe
 
 
 def in_si(signal: Signal, unit: str | None, si: str, where: str) -> Array:
-    """Return the values of a signal in an SI unit; `ModelError` if neither the file nor the table says its own."""
+    """Return the values of a signal in an SI unit; `ModelError` if neither the file nor the table states a unit."""
     if unit is None and not signal.unit:
-        raise ModelError(f"{where}: {signal.name}: the file names no unit; give unit")
+        raise ModelError(f"{where}: {signal.name}: the file states no unit; give unit")
     try:
         return np.asarray(signal.values) * unit_factor(unit or signal.unit, si)
     except SignalError as error:

@@ -16,7 +16,7 @@ def input_index(model: ShakenModel, name: str, where: str) -> int:
     Raises
     ------
     ModelError
-        With the nearest name, if there is none.
+        If there is none; the message suggests the nearest name.
     """
     short = {f"{model.bases[0].name}:{entry}": entry for entry in DIRECTIONS} if len(model.bases) == 1 else {}
     for k, full in enumerate(model.inputs):
@@ -46,8 +46,8 @@ def band_notes(model: ShakenModel, last: float, where: str) -> list[str]:
     relation = "below" if f[-1] < last else "near"
     return [
         f"{where}: the band ends at {last:g} Hz, the last mode with the bases held is at {f[-1]:.4g} Hz, {relation} "
-        "its end: "
-        f"what the structure has between there and {MARGIN * last:.4g} Hz is left out but for its static part; "
+        "its end; "
+        f"modes between there and {MARGIN * last:.4g} Hz contribute only their static part; "
         "reduce the "
         "body with more modes"
     ]

@@ -1,6 +1,6 @@
 """Levels over frequency: accelerations and power spectral densities, in the units of test specifications.
 
-Between two rows a level is straight in log-log axes, as test specifications draw it; outside of them there is none.
+Between two rows a level is linear in log-log axes, as in test specifications; outside its rows it is zero.
 """
 
 import re
@@ -56,7 +56,8 @@ class Level:
     Raises
     ------
     ModelError
-        With the row, if frequencies do not rise above zero, or a level is not a number above zero.
+        If frequencies are not positive and increasing, or a level is not a number above zero; the message names the
+        row.
     """
 
     frequencies: Array
@@ -78,15 +79,13 @@ class Level:
                 raise ModelError(f"{self.where}: {names[k]}: frequency {frequency:g} Hz: expected a number above 0")
             if not np.isfinite(value) or value <= 0:
                 raise ModelError(
-                    f"{self.where}: {names[k]}: {value:g} {self.unit} at {frequency:g} Hz: a level must stay above "
-                    "0 (it is "
-                    "straight in log-log axes); end the table where the level ends"
+                    f"{self.where}: {names[k]}: {value:g} {self.unit} at {frequency:g} Hz: expected a level above "
+                    "0 (it is linear in log-log axes); end the table where the level ends"
                 )
             if k and frequency <= f[k - 1]:
                 raise ModelError(
-                    f"{self.where}: {names[k]}: {frequency:g} Hz after {f[k - 1]:g} Hz: frequencies must rise; give "
-                    "a step "
-                    "two frequencies close together"
+                    f"{self.where}: {names[k]}: {frequency:g} Hz after {f[k - 1]:g} Hz: expected increasing "
+                    "frequencies; write a step with two frequencies close together"
                 )
         object.__setattr__(self, "frequencies", frozen(f))
         object.__setattr__(self, "values", frozen(values))
@@ -144,7 +143,7 @@ def read_level(path: Path, unit: str, where: str) -> Level:
     Raises
     ------
     ModelError
-        With the line, if it is not two numbers or what `Level` refuses.
+        If a line is not two numbers, or `Level` refuses it; the message names the line.
     """
     try:
         text = path.read_text(encoding="utf-8-sig")
@@ -199,13 +198,13 @@ def in_model(level: Level, direction: str, units: Units) -> float:
     Raises
     ------
     ModelError
-        If the level is of a translation and the direction a rotation, or the other way about.
+        If the level is for a translation and the direction is a rotation, or vice versa.
     """
     turns = direction.startswith("r")
     if turns != level.is_rotation:
         raise ModelError(
             f"{level.where}: unit {level.unit} for direction {direction}, expected "
-            f"{'rad/s2 or (rad/s2)2/Hz: it is a rotation' if turns else 'an acceleration of a translation'}"
+            f"{'rad/s2 or (rad/s2)2/Hz for a rotation' if turns else 'an acceleration of a translation'}"
         )
     factor = units.time**2 if turns else gravity_in(units) / STANDARD_GRAVITY
     return float(factor**2 if level.is_density else factor)
@@ -214,7 +213,8 @@ def in_model(level: Level, direction: str, units: Units) -> float:
 def level_rms(level: Level) -> float:
     """Return the root mean square of a density, exact for straight lines in log-log axes [unit of the acceleration].
 
-    Over a piece S = S_1 (f/f_1)^n: S_1 f_1 ((f_2/f_1)^(n+1) - 1)/(n + 1), and S_1 f_1 ln(f_2/f_1) for n = -1.
+    The integral of a piece S = S_1 (f/f_1)^n is S_1 f_1 ((f_2/f_1)^(n+1) - 1)/(n + 1), or S_1 f_1 ln(f_2/f_1) for
+    n = -1.
     """
     f, s = level.frequencies, level.values
     ratio = np.log(f[1:] / f[:-1])

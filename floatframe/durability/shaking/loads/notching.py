@@ -4,14 +4,13 @@ Sine:    a(f) = min(level, limit_k(f) / |H_k(f)|)                     amplitudes
 Random:  S(f) = min(level, limit_k(f) / |H_k(f)|²)                    densities
          S(f) = min(level, c_k / |H_k(f)|²), c_k so that the rms is kept      rms
 
-Force limits hold the interface force as in flight, where the mounting gives way (Scharton (1997)):
+Force limits keep the interface force as small as in flight, where the mounting is compliant (Scharton (1997)):
 
     S_FF = C² M_0² S_AA               f < f_0
     S_FF = C² M_0² S_AA (f_0/f)^n     f >= f_0
 
-with the mass M_0, the frequency f_0 of the main mode, C of the mounting structure and n its roll-off (2 for
-densities); of
-sine amplitudes the square root. The answer between the points is that of the resolved grid.
+with the mass M_0, the frequency f_0 of the main mode, the factor C of the mounting structure and its roll-off n (2 for
+densities). The limit of sine amplitudes is the square root. Notches are computed on the resolved grid.
 """
 
 import math
@@ -76,7 +75,7 @@ class ResponseLimit:
         for value in (self.level, self.rms):
             if value is not None and not (math.isfinite(value) and value > 0):
                 raise ModelError(
-                    f"notch {self.name or self.output!r}: a limit of {value!r} cannot be kept by any input; "
+                    f"notch {self.name or self.output!r}: no input satisfies a limit of {value!r}; "
                     "expected a number above 0"
                 )
         if not (math.isfinite(self.factor) and self.factor > 0):
@@ -175,7 +174,7 @@ def notched_sine(model: ShakenModel, run: SineRun, limits: Sequence[Limit], deep
     Raises
     ------
     ModelError
-        If a limit asks for a notch deeper than allowed, or is one of a random test.
+        If a limit requires a notch deeper than allowed, or is an rms, which only random tests have.
     """
     transfer, wide = run.sizes / run.level[:, None], run.uncertain / run.level[:, None]
     allowed, of = np.full((len(limits), len(run.frequencies)), np.inf), {}
@@ -209,7 +208,9 @@ def notched_random(model: ShakenModel, run: RandomRun, limits: Sequence[Limit], 
     The limits apply to the densities with uncertainty; the returned densities and rms are nominal.
     """
     if run.level.shape[1] != 1:
-        raise ModelError(f"notch: random {run.test!r} drives several inputs at once; notches are made of one direction")
+        raise ModelError(
+            f"notch: random {run.test!r} drives several inputs at once; expected one direction for notches"
+        )
     f, level = run.band.frequencies, run.level[:, 0]
     transfer, wide = run.density / level[:, None], run.wide / level[:, None]
     allowed, of = np.full((len(limits), len(f)), np.inf), {}
@@ -249,7 +250,7 @@ def limit_over(model: ShakenModel, output: Output, limit: ResponseLimit, f: Arra
     Raises
     ------
     ModelError
-        If its table is of another quantity than the output, or of amplitudes where densities are limited.
+        If its table is for another quantity than the output, or for amplitudes although densities are limited.
     """
     scale = in_output_units(model, output, 1.0) ** (2 if density else 1)
     if limit.level is not None:
@@ -333,7 +334,7 @@ def require_possible(notches: Sequence[Notch], deepest: float, where: str) -> No
     worst = max(notches, key=lambda notch: notch.depth, default=None)
     if worst is not None and worst.depth > deepest:
         raise ModelError(
-            f"{where}: {worst.reason} asks for a notch of {worst.depth:.1f} dB at {worst.deepest:.4g} Hz (the "
+            f"{where}: {worst.reason} requires a notch of {worst.depth:.1f} dB at {worst.deepest:.4g} Hz (the "
             "output would reach "
             f"{worst.unnotched:.4g}, allowed {worst.limit:.4g}), more than the {deepest:g} dB that are allowed; "
             "check the "

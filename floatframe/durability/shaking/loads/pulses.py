@@ -1,11 +1,11 @@
 """Shock pulses of test specifications, and accelerations synthesised for a shock response spectrum.
 
-Of two kinds of shapes, one a frequency of the target, with amplitudes corrected by what the spectrum of their sum
-lacks, again and again:
+An acceleration is the sum of shapes of one of two kinds, one for each frequency of the target. Their amplitudes are
+corrected repeatedly by the ratio of the target to the spectrum of the sum:
 
 - wavelets a sin(2 pi f t) sin(2 pi f t/N), 0 <= t <= N/(2 f), N odd and 3 or more, which begin and end at rest;
-- damped sines a exp(-zeta omega t) sin(omega t), as a pyroshock rings, each with two slow damped sines whose amplitudes
-  take away what it leaves of velocity and displacement (Smallwood & Nord (1974) compensate with one that is delayed).
+- damped sines a exp(-zeta omega t) sin(omega t), as in a pyroshock. Each has two slow damped sines, whose amplitudes
+  cancel the velocity and displacement at its end (Smallwood & Nord (1974) compensate with a single delayed one).
 """
 
 import math
@@ -29,7 +29,7 @@ POINTS_A_CYCLE = 20  #: points per cycle of the highest wavelet
 #: shapes of a history for a spectrum, by name
 SHAPES = {"wavelets": "wavelets, which end at rest", "damped-sines": "damped sines, compensated to end at rest"}
 DECAY = 0.05  #: damping ratio zeta of damped sines by default
-#: frequencies relative to the first one, and damping ratios zeta, of the compensating damped sines
+#: frequencies of the two compensating damped sines, relative to the lowest frequency of the target, and their zeta
 SLOW, SLOW_DECAY = (0.5, 0.25), 0.8
 ENDED = 1e3  #: factor by which the first damped sine has decayed at the end
 MOST_NUMBERS = 100_000_000  #: largest number of values of the shapes
@@ -37,9 +37,9 @@ FADE = 0.05  #: last fraction of the duration, over which damped sines are faded
 
 
 def pulse(kind: str, amplitude: float, duration: float, *, edge: float = EDGE) -> tuple[Array, Array]:
-    """Return times and accelerations of a pulse, (n,) each: straight between the points (a half-sine has 401).
+    """Return times and accelerations of a pulse, (n,) each, linear between the points (a half-sine has 401).
 
-    A terminal peak rises straight and ends at once, within 1/1000 of the duration; an initial one is its mirror.
+    A terminal peak rises linearly and drops to zero within 1/1000 of the duration; an initial peak is its mirror image.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def pulse(kind: str, amplitude: float, duration: float, *, edge: float = EDGE) -
     duration
         Duration of the pulse [s].
     edge
-        Rise and fall of a trapezoid over its duration, up to 0.5.
+        Rise and fall of a trapezoid, relative to its duration, up to 0.5.
     """
     if kind not in PULSES:
         raise ModelError(f"shock: pulse: expected one of {', '.join(PULSES)}, got {kind!r}")
@@ -92,7 +92,7 @@ class Synthesis:
 
 
 def synthesised(target: Level, Q: float = 10.0, duration: float | None = None) -> Synthesis:
-    """Return an acceleration of wavelets whose shock response spectrum is near a target.
+    """Return an acceleration of wavelets whose shock response spectrum approximates a target.
 
     (1) wavelets at frequencies 1/6 octave apart, of alternating sign, as many half-cycles as fit into the duration
     (2) `matched`
@@ -104,12 +104,12 @@ def synthesised(target: Level, Q: float = 10.0, duration: float | None = None) -
     Q
         Amplification of the masses.
     duration
-        Of the acceleration [s]; default: five cycles of its lowest frequency.
+        Duration of the acceleration [s]; default: five cycles of its lowest frequency.
     """
     duration = 5 / target.first if duration is None else duration
     if not duration * target.first >= 1.5:
         raise ModelError(
-            f"{target.where}: duration {duration:g} s holds less than three half-cycles of the first frequency, "
+            f"{target.where}: duration {duration:g} s contains less than three half-cycles of the first frequency, "
             f"{target.first:g} Hz; "
             f"expected {1.5 / target.first:.4g} s or more"
         )
@@ -124,11 +124,11 @@ def synthesised(target: Level, Q: float = 10.0, duration: float | None = None) -
 
 
 def damped_sines(target: Level, Q: float = 10.0, duration: float | None = None, *, decay: float = DECAY) -> Synthesis:
-    """Return an acceleration of damped sines whose shock response spectrum is near a target.
+    """Return an acceleration of damped sines whose shock response spectrum approximates a target.
 
     (1) w_k = exp(-zeta omega_k t) sin(omega_k t) at frequencies 1/6 octave apart, faded to zero in the last twentieth
-    (2) w_k - C c_k: two slow damped sines C, a half and a quarter of the first frequency, take away the velocity and
-        the displacement that w_k, straight between its samples, leaves at the end
+    (2) w_k - C c_k: two slow damped sines C, at a half and a quarter of the first frequency, cancel the velocity and
+        the displacement of w_k, linear between its samples, at the end
     (3) `matched`
 
     Parameters
@@ -138,21 +138,21 @@ def damped_sines(target: Level, Q: float = 10.0, duration: float | None = None, 
     Q
         Amplification of the masses.
     duration
-        Of the acceleration [s]; default: until the first damped sine has decayed to a thousandth.
+        Duration of the acceleration [s]; default: until the first damped sine has decayed to a thousandth.
     decay
-        zeta of the sines.
+        Damping ratio zeta of the sines.
 
     Raises
     ------
     ModelError
-        If the duration holds less than three cycles of the first frequency, or the decay is not between 0 and 0.5.
+        If the duration contains less than three cycles of the first frequency, or the decay is not between 0 and 0.5.
     """
     if not 0.005 <= decay <= 0.5:
         raise ModelError(f"{target.where}: decay: expected a ratio from 0.005 to 0.5, got {decay:g}")
     duration = math.log(ENDED) / (2 * np.pi * decay * target.first) if duration is None else duration
     if not duration * target.first >= 3:
         raise ModelError(
-            f"{target.where}: duration {duration:g} s holds less than three cycles of the first frequency, "
+            f"{target.where}: duration {duration:g} s contains less than three cycles of the first frequency, "
             f"{target.first:g} Hz; expected {3 / target.first:.4g} s or more"
         )
     f, t = grid(target, duration)
@@ -194,9 +194,9 @@ def grid(target: Level, duration: float) -> tuple[Array, Array]:
 def matched(target: Level, Q: float, f: Array, t: Array, waves: Array) -> Synthesis:
     """Return the sum of shapes whose spectrum approximates the target.
 
-    (1) amplitudes of alternating sign; the spectrum of the sum at the frequencies of the shapes; amplitudes times
-        (target/spectrum)^0.6
-    (2) again, 60 times; the round with the least largest deviation is kept, and compared at 1/12 octave
+    (1) start with amplitudes of alternating sign
+    (2) multiply the amplitudes by (target/spectrum)^0.6, with the spectrum of the sum at the frequencies of the shapes
+    (3) repeat (2) 60 times, and return the sum with the smallest maximum deviation, compared at 1/12 octave
 
     Parameters
     ----------

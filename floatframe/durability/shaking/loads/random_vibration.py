@@ -2,8 +2,8 @@
 
     S_y(f) = H(f) S(f) H(f)^H,   sigma² = ∫ S_y df,   nu² = ∫ f² S_y df / sigma²
 
-S is Hermitian and positive semidefinite: densities on its diagonal, coherence gamma² and phase beside it,
-S_ab = gamma sqrt(S_aa S_bb) exp(i phase). The integrals are those of `resolved`, which bounds their error.
+S is Hermitian and positive semidefinite, with densities on its diagonal. Its other entries follow from the coherence
+gamma² and the phase, S_ab = gamma sqrt(S_aa S_bb) exp(i phase). The integrals and their error bounds are in `resolved`.
 """
 
 import math
@@ -30,7 +30,7 @@ from floatframe.errors import ModelError
 
 __all__ = ["CrossSpectrum", "Miles", "RandomRun", "RandomTest", "input_density", "random_run", "random_runs"]
 
-ROUNDING = 1e-9  #: magnitude of the smallest eigenvalue of a coherence matrix that counts as rounding error of zero
+ROUNDING = 1e-9  #: largest magnitude of a negative eigenvalue of a coherence matrix that counts as rounding error
 CHUNK_SIZE = 4_000_000  #: largest number of stress values in memory
 
 
@@ -48,7 +48,7 @@ class CrossSpectrum:
     coherence
         Coherence gamma², 0 to 1.
     phase
-        Phase of S_ab, positive where a leads b [degrees].
+        Phase of S_ab, positive if a leads b [degrees].
     """
 
     a: str
@@ -62,7 +62,8 @@ class CrossSpectrum:
 class RandomTest:
     """A stationary Gaussian excitation.
 
-    `level` excites one direction after the other, each a run; `levels` excite several inputs at once, a single run.
+    `level` excites one direction after the other, with one run for each; `levels` excite several inputs in a single
+    run.
 
     Parameters
     ----------
@@ -93,7 +94,9 @@ class RandomTest:
             raise ModelError(f"{where}: expected either level (one direction after the other) or levels (all at once)")
         for level in [self.level] if self.level is not None else list((self.levels or {}).values()):
             if not level.is_density:
-                raise ModelError(f"{where}: unit {level.unit} is no density; expected g2/Hz, (m/s2)2/Hz, ...")
+                raise ModelError(
+                    f"{where}: expected the unit of a density, such as g2/Hz or (m/s2)2/Hz, got {level.unit}"
+                )
         if self.levels is not None and not self.levels:
             raise ModelError(f"{where}: levels: expected one input at least")
         if self.cross and self.levels is None:
@@ -164,7 +167,8 @@ def random_run(
     Raises
     ------
     ModelError
-        If there is no such input, a mode in the band has no damping, or the cross spectra are no spectra.
+        If there is no such input, a mode in the band has no damping, or the cross spectra are not positive
+        semidefinite.
     """
     where, uncertainty = f"shake: random {test.name!r}", uncertainty or Uncertainty()
     acting = {input_index(model, name, where): (name, level) for name, level in levels.items()}
@@ -228,7 +232,7 @@ def input_density(model: ShakenModel, test: RandomTest, acting: Mapping[int, tup
     Raises
     ------
     ModelError
-        If it has a negative eigenvalue: no signals have such coherences and phases.
+        If it has a negative eigenvalue, because no signals have such coherences and phases.
     """
     where = f"shake: random {test.name!r}"
     columns = list(acting)
@@ -277,8 +281,8 @@ def densities(G: Array, groups: Sequence[slice]) -> Array:
 def wide_densities(uncertainty: Uncertainty, f: Array, H: Array, root: Array, groups: Sequence[slice]) -> Array:
     """Return the densities with uncertain frequencies and factors, (n_f, n_out).
 
-    That of an output at f is the largest of those by the transfer functions between f/(1 + delta) and f/(1 - delta),
-    under the spectral matrix L L^H of the inputs at f.
+    The density of an output at f is the largest one for the transfer functions between f/(1 + delta) and f/(1 - delta),
+    with the spectral matrix L L^H of the inputs at f.
     """
     if root.shape[1] == 1:
         return uncertainty.widened(f, np.sqrt(densities(H, groups))) ** 2 * np.abs(root[:, 0]) ** 2

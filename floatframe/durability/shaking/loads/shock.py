@@ -25,8 +25,10 @@ POINTS_A_CYCLE = 20  #: points per cycle of the highest vibrating mode
 AFTER = 10.0  #: cycles of the lowest mode that are computed after the end of an input
 MOST_SAMPLES = 2_000_000
 ON_GRID = 1e-6  #: fraction of a step by which a time may deviate from the time grid
-COARSE_DIGIT = 0.25  #: fraction of a step above which the last digit of a time is too coarse to identify its step
-LOST = 0.01  #: change of a history by new times, relative to its largest value, above which there is a note
+COARSE_DIGIT = (
+    0.25  #: rounding of the last digit of times, as a fraction of a step, above which the step cannot be identified
+)
+LOST = 0.01  #: change of a history by resampling, relative to its largest value, above which there is a note
 
 
 @dataclass(frozen=True)
@@ -41,9 +43,9 @@ class SpectrumRequest:
     kind
         "acceleration", "displacement" or "pseudo-velocity".
     first
-        First frequency [Hz]; None: a tenth of the lowest mode, or 10 Hz if that is less.
+        First frequency [Hz]; None: a tenth of the frequency of the lowest mode, at most 10 Hz.
     last
-        Last frequency [Hz]; None: twice the highest mode, 10000 Hz at most.
+        Last frequency [Hz]; None: twice the frequency of the highest mode, at most 10000 Hz.
     per_octave
         Number of frequencies in an octave.
     """
@@ -70,7 +72,7 @@ class SpectrumRequest:
 class TimeTest:
     """Histories of inputs, linear between their samples.
 
-    `history` excites one direction after the other, each a run; `inputs` are given all at once, a single run.
+    `history` excites one direction after the other, with one run for each; `inputs` act at once in a single run.
 
     Parameters
     ----------
@@ -85,7 +87,7 @@ class TimeTest:
     inputs
         Inputs by name, in SI [m/s², rad/s², N, N m], (n_t,) each.
     after
-        Time to compute after the end of the history [s]; None: 10 cycles of the lowest mode, of a transient 0.
+        Time to compute after the end of the history [s]; None: 10 cycles of the lowest mode, or 0 for a transient.
     spectra
         The requested shock response spectra.
     kind
@@ -124,10 +126,10 @@ class TimeTest:
         ).items():
             values = np.asarray(values, dtype=float)
             if values.shape != t.shape:
-                raise ModelError(f"{where}: {name}: expected {len(t)} values, one a time, got {values.shape}")
+                raise ModelError(f"{where}: {name}: expected {len(t)} values, one per time, got {values.shape}")
             if not np.isfinite(values).all():
                 k = int(np.flatnonzero(~np.isfinite(values))[0])
-                raise ModelError(f"{where}: {name}: row {k + 1} is no number; mend or cut the gap")
+                raise ModelError(f"{where}: {name}: row {k + 1}: expected a finite number; fill or cut the gap")
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,8 +178,9 @@ def time_run(
 ) -> TimeRun:
     """Return the outputs for histories of some inputs, starting from rest.
 
-    (1) samples dense enough for the highest mode, on the straight pieces that are given
-    (2) modes one by one, exact from sample to sample; with uncertain frequencies the largest of three runs
+    (1) the inputs are sampled densely enough for the highest mode; samples are on the given linear pieces
+    (2) modes are integrated one by one, exactly from sample to sample; with uncertain frequencies, the largest value of
+        three runs is taken
 
     Raises
     ------
@@ -197,7 +200,7 @@ def time_run(
         raise ModelError(
             f"{where}: {n_t:.2g} samples are needed for the highest mode, {f[-1]:.4g} Hz, over "
             f"{given[-1] + after:.4g} s, expected "
-            f"up to {MOST_SAMPLES:.0e}; let higher modes answer statically (residual_above), or shorten the history"
+            f"up to {MOST_SAMPLES:.0e}; let higher modes respond statically (residual_above), or shorten the history"
         )
     rows = np.stack(
         [
@@ -224,7 +227,9 @@ def time_run(
     low = min(10.0, float(f[0]) / 10) if request.first is None else request.first
     high = min(1e4, 2 * float(f[-1])) if request.last is None else request.last
     if not low < high:
-        raise ModelError(f"{where}: spectra: first, last: from {low:g} to {high:g} Hz nothing lies; give both")
+        raise ModelError(
+            f"{where}: spectra: first, last: expected increasing frequencies, got {low:g} and {high:g} Hz; give both"
+        )
     frequencies = octave_frequencies(low, high, request.per_octave)
     signals = {model.inputs[k]: values[j] for j, k in enumerate(columns) if model.rates[k] == 2}
     signals |= {o.name: out[i] for i, o in enumerate(outputs) if o.kind == "acceleration"}
@@ -256,28 +261,26 @@ def time_run(
 
 
 def sampled(given: Array, values: Array, h: float, after: float) -> tuple[Array, Array, str]:
-    """Return equal time steps of at most h, the values there, and a note on how the times were changed, else "".
+    """Return equal time steps of at most h, the values there, and a note if the times were changed, otherwise "".
 
-    (1) times that are multiples of a step, exactly or rounded to their last digit: this step, divided
-    (2) other times: steps of half the shortest distance. The values are the least-squares fit to the given straight
-        pieces, which keeps areas and first moments and does not alias content faster than the steps.
+    (1) If times are multiples of a step, exactly or rounded to their last digit, this step is divided.
+    (2) Otherwise, steps are half the shortest given step. The values are the least-squares fit to the given linear
+        pieces, which preserves areas and first moments and does not alias content faster than the steps.
 
-    Beyond the last given time the values are zero, from the next step on.
+    After the last given time the values are zero, from the next step on.
 
     Parameters
     ----------
     given
-        Rising times from 0, (n,).
+        Increasing times from 0, (n,).
     values
-        (n_act, n), straight between them.
+        Values at these times, (n_act, n), linear between them.
     """
     words = ""
     if (equal := equal_steps(given)) is not None:  # (1)
         step, counts, miss = equal
         if miss > ON_GRID * step:
-            words = (
-                f"times lie up to {miss:.2g} s off equal steps of {step:.6g} s, as rounded digits do: taken as equal"
-            )
+            words = f"times deviate by up to {miss:.2g} s from equal steps of {step:.6g} s; taken as equal steps"
         step, places = step / math.ceil(step / h * (1 - ON_GRID)), step * counts
         n = round(places[-1] / step)
     else:  # (2)
@@ -285,7 +288,7 @@ def sampled(given: Array, values: Array, h: float, after: float) -> tuple[Array,
         room = MOST_SAMPLES * given[-1] / (given[-1] + after)
         n = math.ceil(given[-1] / min(h, max(float(np.diff(given).min()) / 2, given[-1] / room)))
         step = given[-1] / n
-        words = f"unequal times were sampled anew every {step:.4g} s, areas under the straight pieces kept"
+        words = f"unequal times were resampled every {step:.4g} s; areas under the linear pieces are preserved"
     t = np.arange(n + math.ceil(after / step) + 1) * step
     found = np.zeros((len(values), len(t)))
     for row, new in zip(values, found, strict=True):
@@ -301,7 +304,7 @@ def sampled(given: Array, values: Array, h: float, after: float) -> tuple[Array,
 def equal_steps(given: Array) -> tuple[float, Array, float] | None:
     """Return the step of equally spaced times, the multiples, and the largest deviation; None if there is no such step.
 
-    A deviation of `ON_GRID` of a step, or of the rounding to the last digit of the times, is accepted.
+    Deviations up to `ON_GRID` of a step, or up to the rounding of the last digit of the times, are accepted.
     """
     distances = np.diff(given)
     least = float(distances.min())
@@ -317,10 +320,10 @@ def equal_steps(given: Array) -> tuple[float, Array, float] | None:
 
 
 def nearest_straight(places: Array, values: Array, t: Array) -> Array:
-    """Return the least-squares fit, straight between equal times t, to values straight between places, (n_t,).
+    """Return the least-squares fit, linear between equal times t, to values linear between `places`, (n_t,).
 
-    M v = b: with hats N_k on t, M_kl is the integral of N_k N_l and b_k that of N_k times the given straight pieces,
-    by Simpson's rule between all times of both, where the product is a parabola.
+    It solves M v = b. With hat functions N_k on t, M_kl is the integral of N_k N_l, and b_k is the integral of N_k
+    times the given pieces. Simpson's rule between all times of both grids is exact, because the product is a parabola.
     """
     step, n = float(t[1]), len(t)
     ends = np.union1d(places, t)

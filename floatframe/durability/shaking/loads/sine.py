@@ -1,15 +1,14 @@
 """Sine tests: steady-state responses to a level over frequency, and responses during the sweep itself.
 
-A sweep s_ddot = Re(F(t) exp(i phi(t))), phi_dot = 2 pi f, f = f_1 2^(R t), is answered by Re(w), w the response to
-F exp(i phi): |w| is its envelope. In eigenvectors of the state matrix each state follows p_dot = mu p + c F exp(i
-phi), and over a step h
+The response to a sweep s_ddot = Re(F(t) exp(i phi(t))), phi_dot = 2 pi f, f = f_1 2^(R t), is Re(w), where w is the
+response to F exp(i phi) and |w| its envelope. In eigenvectors of the state matrix, each state follows
+p_dot = mu p + c F exp(i phi), and over a step h
 
     p(h) = exp(mu h) p(0) + c ∫_0^h exp(mu (h - t)) G(t) exp(i phi_dot(0) t) dt exp(i phi(0)),   G = F exp(i r)
 
-with r the phase beyond the frequency at its start, ½ phi_ddot t² about 0.001. G is smooth whatever the frequency: a
-cubic through four
-points, whose moments with the exponentials are exact. The step follows the sweep, 0.05 / sqrt(phi_ddot), not the
-oscillation.
+where r is the phase in excess of the frequency at the start of the step, ½ phi_ddot t², about 0.001. G is smooth for
+any frequency, and is replaced by a cubic through four points, whose moments with the exponentials are exact. The step
+0.05 / sqrt(phi_ddot) depends on the sweep, not on the oscillation.
 """
 
 import itertools
@@ -49,7 +48,7 @@ class SineTest:
     directions
         Directions, one run for each; "base:x" if there are several bases.
     rate
-        Octaves per minute; None: so slow that the response is steady.
+        Sweep rate in octaves per minute; None: the response is steady at every frequency.
     downward
         Whether the sweep runs from the last frequency to the first.
     """
@@ -67,9 +66,9 @@ class SineTest:
                 f"{where}: level: unit {self.level.unit} is that of a random test; expected g, m/s2, mm, ..."
             )
         if self.rate is not None and not (math.isfinite(self.rate) and self.rate > 0):
-            raise ModelError(f"{where}: rate: expected octaves a minute above 0, got {self.rate!r}")
+            raise ModelError(f"{where}: rate: expected octaves per minute above 0, got {self.rate!r}")
         if not self.directions:
-            raise ModelError(f"{where}: directions: expected one at least")
+            raise ModelError(f"{where}: directions: expected at least one")
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,18 +146,18 @@ def sine_run(model: ShakenModel, test: SineTest, direction: str, uncertainty: Un
 def sweep_envelope(model: ShakenModel, k: int, test: SineTest, step: float = STEP) -> tuple[Array, Array]:
     """Return the frequencies of a sweep [Hz], (n_t,), and the complex envelopes of the outputs, (n_t, n_rows).
 
-    It begins in the steady state of its first frequency.
+    The sweep begins in the steady state of its first frequency.
 
     Raises
     ------
     ModelError
-        If the input moves bases against each other (their displacement would have to be swept too).
+        If the input moves bases relative to each other, which needs a sweep of their displacement too.
     """
     where, rate = f"shake: sine {test.name!r}", test.rate
     assert rate is not None
     if model.B[:2, :, k].any() or model.D[:2, :, k].any():
         raise ModelError(
-            f"{where}: rate: several bases that move against each other are swept in steady state only; leave rate out"
+            f"{where}: rate: bases that move relative to each other are supported only in steady state; remove rate"
         )
     growth = rate / 60 * math.log(2.0)  # growth rate of the frequency [1/s]
     f, t = sweep_times(test, growth, step, where)
@@ -184,7 +183,7 @@ def sweep_envelope(model: ShakenModel, k: int, test: SineTest, step: float = STE
     for n in range(len(f) - 1):
         h, w = t[n + 1] - t[n], 2 * np.pi * f[n]
         own = f[n] * np.exp(sign * growth * h * nodes)
-        # phase beyond that of the frequency at the start of the step: w (exp(g t) - 1 - g t)/g
+        # phase in excess of the constant frequency at the start of the step: w (exp(g t) - 1 - g t)/g
         x = sign * growth * h * nodes
         beyond = w * (np.expm1(x) - x) / (sign * growth)
         powers = to_powers @ (load(own) * np.exp(1j * beyond))
@@ -214,8 +213,8 @@ def sweep_times(test: SineTest, growth: float, step: float, where: str) -> tuple
         n = max(n, math.ceil(duration * growth / 0.05), 8)
         if n > MOST_STEPS:
             raise ModelError(
-                f"{where}: rate: {test.rate:g} octaves a minute take {n:.1e} steps; leave it out: so slow a sweep "
-                "is steady"
+                f"{where}: rate: {test.rate:g} octaves per minute take {n:.1e} steps; remove it, because such a slow "
+                "sweep is steady"
             )
         own = np.linspace(math.sqrt(a), math.sqrt(b), n + 1)[1:] ** 2
         own[-1] = b

@@ -4,7 +4,8 @@
     80 to 350 Hz      0.04 g2/Hz
     350 to 2000 Hz    -3 dB/oct
 
-A decibel is 10 log10 of a ratio of densities, 20 log10 of one of amplitudes. A slope goes on from the level beside it.
+Decibels are 10 log10 of a ratio of densities, or 20 log10 of a ratio of amplitudes. A slope begins at the adjacent
+level.
 """
 
 import math
@@ -28,24 +29,25 @@ Band = Sequence[float | str]
 def level_of_bands(bands: Sequence[Band], unit: str, where: str) -> Level:
     """Return the level of bands (from Hz, to Hz, level or slope), one after the other.
 
-    (1) bands that have a level: two corners each
-    (2) slopes from the next level towards the ends of the list: S_2 = S_1 10^(s/10 log2(f_2/f_1)) of a density,
-        s/20 of an amplitude
-    (3) a slope between two levels must meet both within 0.5 dB; then the straight line through both is taken
+    (1) bands with a level have two corners
+    (2) slopes continue from a level towards the ends of the list: S_2 = S_1 10^(s/10 log2(f_2/f_1)) for a density, with
+        s/20 for an amplitude
+    (3) a slope between two levels must meet both within 0.5 dB; it is replaced by the straight line through both
 
     Parameters
     ----------
     bands
         First and last frequency [Hz], and a level in `unit` or a slope in dB per octave, in ascending order.
     unit
-        Unit of the levels; it says whether they are densities or amplitudes.
+        Unit of the levels, which is that of densities or amplitudes.
     where
-        Place of the bands in the file, for messages.
+        Location of the bands in the file, for messages.
 
     Raises
     ------
     ModelError
-        With the band, if bands leave a gap, none has a level, levels make a step, or a slope is no slope.
+        If there is a gap between bands, none has a level, levels make a step, or a slope is not valid; the message
+        names the band.
     """
     known = known_unit(unit, where)
     decibel = 10.0 if known in DENSITIES else 20.0
@@ -108,7 +110,7 @@ def parsed(
             raise ModelError(f"{place}: {f_1:g} to {f_2:g} Hz: expected rising frequencies above 0")
         if last and not math.isclose(f_1, last[-1], rel_tol=1e-9):
             raise ModelError(
-                f"{place}: begins at {f_1:g} Hz, and the one before ends at {last[-1]:g} Hz; expected no gap "
+                f"{place}: begins at {f_1:g} Hz, but the previous band ends at {last[-1]:g} Hz; expected no gap "
                 "between them"
             )
         first.append(last[-1] if last else f_1)
@@ -126,7 +128,9 @@ def parsed(
         else:
             level = float(what)
             if not (math.isfinite(level) and level > 0):
-                raise ModelError(f"{place}: {level:g} {unit}: a level must stay above 0; end the table where it ends")
+                raise ModelError(
+                    f"{place}: {level:g} {unit}: expected a level above 0; end the table where the level ends"
+                )
             levels.append(level)
             slopes.append(None)
     return first, last, levels, slopes

@@ -1,8 +1,7 @@
 """Model uncertainty: factors on responses, and uncertain frequencies.
 
-With a share delta of the frequencies, the response at f is the largest of the transfer functions between f/(1 +
-delta) and
-f/(1 - delta), under the level at f: as if the model had been stretched along the axis by up to delta.
+With the relative uncertainty delta of frequencies, the response at f is the level at f times the largest transfer
+function between f/(1 + delta) and f/(1 - delta), as if all frequencies of the model could change by up to delta.
 """
 
 import math
@@ -76,7 +75,7 @@ class Uncertainty:
         return factor, share
 
     def windows(self, frequencies: Array) -> tuple[Array, IntArray, IntArray]:
-        """Return the factor at each frequency, and which frequencies it may be: from low to below high, (n_f,) each."""
+        """Return the factor at each frequency, and the indices of its window, from low to below high, (n_f,) each."""
         f = np.asarray(frequencies)
         factor, share = self.of(f)
         low = np.searchsorted(f, f / (1 + share) * (1 - SAME), side="left")

@@ -1,14 +1,15 @@
 """Frequencies that resolve resonances, and integrals over them with error bounds.
 
-Between two modes a response is smooth; at a mode it is a peak of half-power width 2 zeta f. The band is cut
+Between two modes a response is smooth; at a mode it has a peak of half-power width 2 zeta f. The band is cut
 
     at its ends, at the corners of the levels, and at thirds of an octave,
     at every mode f, and at f (1 ± zeta k), k = 1, 3, 9, ... until zeta k reaches a tenth,
 
-and each panel has the points of Clenshaw and Curtis' rule with 12 intervals (extremes of a Chebyshev polynomial, ends
-and the peak itself among them). The rule with half of them is nested in it: the difference of both bounds the error.
-A pole of the response lies at i zeta f from its mode, hence no nearer to a panel than 4.2 in the sum of the half axes
-of its Bernstein ellipse, so that the error falls like 4.2^-12 = 3e-8 (Trefethen (2008)).
+and each panel has the points of the Clenshaw-Curtis rule with 12 intervals (extremes of a Chebyshev polynomial, which
+include the ends and the peak). The rule with half as many intervals is nested in it; the difference of both bounds the
+error. A pole of the response is at a distance i zeta f from its mode, so that for each panel it is outside the
+Bernstein ellipse whose half axes have the sum 4.2. The error is therefore of the order of 4.2^-12 = 3e-8 (Trefethen
+(2008)).
 """
 
 from collections.abc import Sequence
@@ -55,7 +56,7 @@ def resolved_band(
     Parameters
     ----------
     first, last
-        Its ends [Hz].
+        Ends of the band [Hz].
     modes, damping
         Frequencies [Hz] and damping ratios of the modes, (n_m,).
     corners

@@ -1,10 +1,9 @@
 """Shock response spectra: the largest response of single masses to an acceleration of their base.
 
-A mass on the frequency f with amplification Q: z its motion relative to the base, a = -(2 zeta omega z_dot + omega²
-z) its
-absolute acceleration. Spectra are max |a|, max |z|, and the pseudo-velocity omega max |z|; primary over the time
-that is
-given, residual beyond it, where the mass vibrates freely and its largest value follows from its state in closed form.
+For a mass with natural frequency f and amplification Q, z is its motion relative to the base, and its absolute
+acceleration is a = -(2 zeta omega z_dot + omega² z). Spectra are max |a|, max |z|, and the pseudo-velocity
+omega max |z|. The primary spectrum covers the given time. The residual spectrum covers the free vibration after it,
+whose largest value follows from the state in closed form.
 """
 
 from dataclasses import dataclass
@@ -50,7 +49,7 @@ def shock_response_spectrum(
     Parameters
     ----------
     acceleration
-        Of the base, (n_t,) in any unit.
+        Acceleration of the base, (n_t,), in any unit.
     h
         Time between samples [s].
     frequencies
@@ -58,10 +57,10 @@ def shock_response_spectrum(
     Q
         Amplification, 1/(2 zeta).
     kind
-        "acceleration" (absolute, in the unit of the base), "displacement" (relative) or "pseudo-velocity", in its unit
-        times s² and s.
+        "acceleration" (absolute, in the unit of the base), "displacement" (relative, this unit times s²) or
+        "pseudo-velocity" (this unit times s).
     residual
-        Whether what comes after the last sample counts, the base then being unaccelerated.
+        Whether the free vibration after the last sample is included.
     """
     if kind not in KINDS:
         raise ModelError(f"shock_response_spectrum: kind: expected one of {', '.join(KINDS)}, got {kind!r}")

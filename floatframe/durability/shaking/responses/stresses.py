@@ -1,12 +1,12 @@
 """Von Mises stress of vibrations: its largest value over a cycle, and its rms and distribution in random vibration.
 
-With sigma the six components, vm² = sigmaᵀ A sigma. For sigma(t) = Re(s exp(i omega t))
+For the six components sigma, vm² = sigmaᵀ A sigma. For sigma(t) = Re(s exp(i omega t))
 
     vm²(t) = ½ (s^H A s + Re(sᵀ A s exp(2 i omega t))),   largest: ½ (s^H A s + |sᵀ A s|)
 
-and for a Gaussian sigma with covariance Sigma the mean square is tr(A Sigma), exactly (Segalman et al. (2000)); the
-density tr(A S(f)) has that integral. vm itself is not Gaussian: vm² is Σ lambda_k chi²_1 with the eigenvalues lambda of
-Lᵀ A L, Sigma = L Lᵀ, and never negative.
+For a Gaussian sigma with covariance Sigma, the mean square is exactly tr(A Sigma) (Segalman et al. (2000)), which is
+the integral of the density tr(A S(f)). vm is not Gaussian and never negative: vm² is Σ lambda_k chi²_1 with the
+eigenvalues lambda of Lᵀ A L, Sigma = L Lᵀ.
 """
 
 from typing import NamedTuple
@@ -70,9 +70,9 @@ def random_von_mises(covariance: Array) -> RandomVonMises:
 def exceeded(lam: Array, x: float) -> float:
     """Return the probability of Σ lam_k z_k² > x for independent standard normal z_k.
 
-    P = 1/(2 pi i) ∫ exp(-s x)/s Π (1 - 2 lam_k s)^(-1/2) ds from below to above, between 0 and the first branch point
-    b = 1/(2 max lam); along the parabola s = b/2 + i u + u²/(4 b), which opens around the branch cut, the integrand
-    falls like exp(-u² x/(4 b)), so that equal steps converge faster than any power.
+    P = 1/(2 pi i) ∫ exp(-s x)/s Π (1 - 2 lam_k s)^(-1/2) ds, upwards between 0 and the first branch point
+    b = 1/(2 max lam). On the parabola s = b/2 + i u + u²/(4 b), which opens around the branch cut, the integrand decays
+    like exp(-u² x/(4 b)), so that the trapezoidal rule converges faster than any power of the step.
     """
     b = 1 / (2 * float(lam.max()))
     end = np.sqrt(4 * b * 40 / x) + 10 * b

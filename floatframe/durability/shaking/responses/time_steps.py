@@ -3,9 +3,8 @@
     eta_ddot + 2 zeta omega eta_dot + omega² eta = a(t),  a straight between t_n and t_n+1
 
 (1) x = (eta, eta_dot): x_n+1 = A x_n + B_0 a_n + B_1 a_n+1, from the power series of the motion in a step
-(2) without x: eta_n + c_1 eta_n-1 + c_2 eta_n-2 = Σ b_k a_n-k, c from the trace and determinant of A: a digital
-filter, whose
-    initial values put x_0 and a_0 right
+(2) with x eliminated: eta_n + c_1 eta_n-1 + c_2 eta_n-2 = Σ b_k a_n-k, where c follows from the trace and determinant
+    of A; this is a digital filter, whose initial values satisfy x_0 and a_0
 """
 
 from dataclasses import dataclass
@@ -41,7 +40,7 @@ def oscillator(omega: float, zeta: float, load: Array, h: float) -> Motion:
     omega, zeta
         Angular frequency [rad/s] and damping ratio of any size.
     load
-        a(t), (n_t,).
+        Load a(t), (n_t,).
     h
         Time between its samples [s].
     """
@@ -50,7 +49,7 @@ def oscillator(omega: float, zeta: float, load: Array, h: float) -> Motion:
         return Motion(a, a, a)
     (A_00, A_01, A_10, A_11), B_0, B_1 = step_of(omega, zeta, h)
     c = np.array([1.0, -(A_00 + A_11), A_00 * A_11 - A_01 * A_10])
-    # z² - tr z + det over adj(z - A) (B_0 + B_1 z): rows of the numerator by falling powers of z
+    # transfer function adj(z - A) (B_0 + B_1 z) / (z² - tr z + det): rows of the numerator by decreasing powers of z
     adjugate = ((-A_11, A_01), (A_10, -A_00))
     outputs = []
     for k in range(2):
@@ -66,9 +65,9 @@ def oscillator(omega: float, zeta: float, load: Array, h: float) -> Motion:
 def step_of(omega: float, zeta: float, h: float) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
     """Return A by rows, B_0 and B_1 of x_n+1 = A x_n + B_0 a_n + B_1 a_n+1, from the power series of the motion.
 
-    In x = Σ c_k (t/h)^k the equation is (k+2)(k+1) c_k+2 = h² a_k - 2 zeta omega h (k+1) c_k+1 - (omega h)² c_k,
-    for the starts (1, 0) and (0, 1) and the loads 1 - t/h and t/h. It converges for every step; where omega h is so
-    large that its terms would cancel, the exponential of the states stands for it. No damping is special.
+    For eta = Σ c_k (t/h)^k the equation is (k+2)(k+1) c_k+2 = h² a_k - 2 zeta omega h (k+1) c_k+1 - (omega h)² c_k,
+    with the initial states (1, 0) and (0, 1) and the loads 1 - t/h and t/h. The series converges for every step. If
+    omega h is so large that its terms cancel, the matrix exponential is used. No damping ratio needs a special case.
     """
     p, z = omega * h, 2 * zeta * omega * h
     if max(p, z) > LONGEST_STEP:
@@ -88,7 +87,7 @@ def step_of(omega: float, zeta: float, h: float) -> tuple[tuple[float, ...], tup
 def end_of_series(
     p: float, z: float, h: float, c: float, following: float, a: float, slope: float
 ) -> tuple[float, float]:
-    """Return value and rate at the end of a step: c and `following` begin the series, a and its slope the load."""
+    """Return value and rate at the end of a step; c and `following` begin the series, the load is a + slope t/h."""
     value, rate, largest = c + following, following, abs(c) + abs(following)
     load = (a * h * h, slope * h * h)
     for k in range(MOST_TERMS):
@@ -115,7 +114,7 @@ def histories(model: ShakenModel, inputs: Array, h: float, columns: IntArray) ->
     Parameters
     ----------
     inputs
-        Of the inputs named by `columns`, (n_act, n_t) [units of the model].
+        Histories of the inputs with the indices `columns`, (n_act, n_t) [units of the model].
     h
         Time between samples [units of time of the model].
     """
@@ -172,10 +171,10 @@ def coupled(model: ShakenModel, load: Array, h: float) -> tuple[Array, Array]:
     for k in range(2 * n_d):
         if mu[k].imag < 0:
             continue
-        twice = 2.0 if mu[k].imag > 0 else 1.0  # with its conjugate
+        twice = 2.0 if mu[k].imag > 0 else 1.0  # includes the conjugate eigenvalue
         e, phi_1, phi_2 = exponentials(mu[k] * h)
         f = left[k] @ load
-        b = h * np.array([phi_2, phi_1 - phi_2])  # of a_n+1, a_n
+        b = h * np.array([phi_2, phi_1 - phi_2])  # factors of a_n+1, a_n
         p = lfilter(b, [1.0, -e], f, zi=np.array([-b[0] * f[0]]))[0]
         eta += twice * np.outer(X[:n_d, k], p).real
         eta_dot += twice * np.outer(X[n_d:, k], p).real
@@ -183,7 +182,7 @@ def coupled(model: ShakenModel, load: Array, h: float) -> tuple[Array, Array]:
 
 
 def exponentials(z: complex) -> tuple[complex, complex, complex]:
-    """Return exp(z), (exp(z) - 1)/z and (exp(z) - 1 - z)/z²; for small z from the series of the last."""
+    """Return exp(z), (exp(z) - 1)/z and (exp(z) - 1 - z)/z²; for small z, from the series of the last one."""
     if abs(z) > SMALL:
         e = complex(np.exp(z))
         return e, (e - 1) / z, (e - 1 - z) / z**2

@@ -1,9 +1,8 @@
 """A reduced body on bases, with driven interfaces, its rigid motion and its modes.
 
-x = (d, theta, q): translation and rotation of the body frame, which nothing but the bases holds, and its modes, with
-the mass and stiffness of docs/theory.md §6 at rest. Of a body that is held already the ground is the base: it moves
-d and
-theta.
+x = (d, theta, q) contains the translation and rotation of the body frame, which only the bases constrain, and the
+modes. Mass and stiffness are those of docs/theory.md §6 at rest. If the body was reduced with the ground held, the
+ground is the base and moves d and theta.
 """
 
 from collections.abc import Mapping, Sequence
@@ -31,10 +30,10 @@ __all__ = ["Held", "bases_of_body", "force_outputs", "held_by_bases", "shaken_bo
 #     M x_ddot + C x_dot + K x = f + Gᵀ lam,   G x = R s
 #
 # (1) N: a basis of the motions that hold the bases, G N = 0
-# (2) x = T s + N y with G T = R and NᵀK T = 0: T carries the structure statically
-# (3) modes of (NᵀK N, NᵀM N), of unit mass: V = N Z, without mass: V_0, of unit stiffness
+# (2) x = T s + N y with G T = R and NᵀK T = 0: T is the static motion with the bases
+# (3) modes of (NᵀK N, NᵀM N): V = N Z with unit mass; massless shapes V_0 with unit stiffness
 # (4) eta_ddot + C_m eta_dot + omega² eta = -VᵀM T s_ddot - VᵀC T s_dot + Vᵀf
-# (5) what the bases exert: Tᵀ(M x_ddot + C x_dot + K x - f), force and moment about their points
+# (5) forces of the bases: Tᵀ(M x_ddot + C x_dot + K x - f), force and moment about their points
 
 
 RANK = 1e-9  #: singular value of the scaled rows, relative to the largest, that counts as zero
@@ -58,15 +57,16 @@ def held_by_bases(where: str, M: Array, K: Array, G: Array, R: Array, scale: Arr
     Parameters
     ----------
     where
-        What it is, for messages.
+        Name of the structure, for messages.
     M, K
-        (n_x, n_x), symmetric.
+        Symmetric mass and stiffness matrices, (n_x, n_x).
     G, R
-        (n_g, n_x), (n_g, n_s).
+        Constrained rows, (n_g, n_x), and their motion with the bases, (n_g, n_s).
     scale
-        Size of x that is one and the same motion of the structure, (n_x,): it tells small entries of G from rounding.
+        Magnitudes of x that move the structure by the same amount, (n_x,); they distinguish small entries of G from
+        rounding errors.
     rigid
-        T where it is known, (n_x, n_s): one base carries everything rigidly.
+        T if it is known, (n_x, n_s), because a single base carries the whole structure rigidly.
 
     Raises
     ------
@@ -110,8 +110,8 @@ def require_held(where: str, K_N: Array, N: Array) -> None:
     if free:
         raise ModelError(
             f"{where}: its bases do not hold it: {free} motion{'s' if free > 1 else ''} without energy "
-            f"remain{'' if free > 1 else 's'} "
-            "while they stand still; give a base an interface with rotations, or one more interface"
+            f"remain{'' if free > 1 else 's'} with fixed bases; give a base an interface with rotations, or one more "
+            "interface"
         )
 
 
@@ -120,9 +120,9 @@ def require_followed(where: str, followed: Array, wanted: Array) -> None:
     defect = float(np.abs(followed - wanted).max() / np.abs(wanted).max())
     if defect > FOLLOWS:
         raise ModelError(
-            f"{where}: its modes cannot follow motions of the bases against each other (by {defect:.1e} of them): it "
-            "lacks static modes of the held interfaces. Reduce the body with a set that has one for each of their dofs "
-            "(craig-bampton, guyan, rubin), or hold all of them with one base"
+            f"{where}: its modes cannot follow relative motions of the bases (relative error {defect:.1e}), because "
+            "it lacks static modes of the held interfaces. Reduce the body with a mode set that has one for each of "
+            "their dofs (craig-bampton, guyan, rubin), or hold all interfaces with one base"
         )
 
 
@@ -152,7 +152,8 @@ def bases_of_body(
     Parameters
     ----------
     bases
-        Name -> interfaces it holds; the name of one interface; None: the only interface, the ground of a held body.
+        Interfaces that each base holds, by name of the base; or the name of one interface; None: the only
+        interface, or the ground for a body that is already held.
     points
         Reference point of a base by name, mesh coordinates; default: that of its first interface.
     """
@@ -160,14 +161,12 @@ def bases_of_body(
     points = points or {}
     if body.is_held:
         if bases not in (None, GROUND, {GROUND: ()}):
-            raise ModelError(
-                f'{where} is held to the ground, which is its only base: leave base out, or write "{GROUND}"'
-            )
+            raise ModelError(f'{where} is held to the ground, which is its only base: remove base, or write "{GROUND}"')
         return (Base(GROUND, (), np.asarray(points.get(GROUND, body.frame.origin), dtype=float)),)
     if bases is None:
         if len(names) != 1:
             raise ModelError(
-                f"{where} has the interfaces {', '.join(names) or '(none)'}: name the one that is the base"
+                f"{where} has the interfaces {', '.join(names) or '(none)'}: name the one that the base holds"
             )
         bases = names[0]
     if isinstance(bases, str):
@@ -175,7 +174,7 @@ def bases_of_body(
     found = []
     for name, held in bases.items():
         if not held:
-            raise ModelError(f"{where}: base {name!r}: expected one interface at least; choices: {', '.join(names)}")
+            raise ModelError(f"{where}: base {name!r}: expected at least one interface; choices: {', '.join(names)}")
         interfaces = [body.interface(other) for other in held]
         point = points.get(name, body.frame.origin + body.frame.axes @ interfaces[0].position)
         found.append(Base(name, tuple(held), np.asarray(point, dtype=float)))
@@ -216,7 +215,7 @@ def shaken_body(
     observed: Sequence[Observed] = (),
     forces: Sequence[str] = (),
 ) -> ShakenModel:
-    """Return a body on its bases (steps 4 and 5 of `elimination`).
+    """Return a body on its bases (steps 4 and 5).
 
     Parameters
     ----------
@@ -226,7 +225,7 @@ def shaken_body(
     Raises
     ------
     ModelError
-        If the bases do not hold the body, or its modes cannot follow them; names that do not exist with the nearest.
+        If the bases do not hold the body, its modes cannot follow them, or a name does not exist.
     """
     where, bases = f"shake: body {body.name!r}", tuple(bases)
     pencil = whole_pencil(body)
@@ -235,7 +234,7 @@ def shaken_body(
     rigid = rigid_motion(body, bases[0]) if len(bases) == 1 else None
     held = held_by_bases(where, M, K, G, R, sizes_of(body), rigid)
     if not len(held.omega):
-        raise ModelError(f"{where}: nothing of it moves while its bases hold it: no mode with mass is left")
+        raise ModelError(f"{where}: no mode with mass is left with fixed bases, so that nothing vibrates")
     F = np.column_stack([force_column(body, name) for name in forces]) if forces else np.zeros((len(M), 0))
     own = np.asarray(pencil.D) if damping.own else np.zeros_like(M)
     on = OnBases(body, bases, M, own, K, F, tuple(forces), held)
@@ -287,7 +286,7 @@ def base_rows(on: OnBases) -> list[OutputRows]:
     D[0, :, n_s:] = -T.T @ on.F
     units = on.body.units
     rows = [OutputRows([o for base in bases for o in force_outputs(base.name, "about its point", units)], E, D)]
-    # power of the wrenches in a motion of all bases with the first, which gives its force and moment
+    # the power of all wrenches in a common rigid motion with the first base gives the net force and moment
     to_net = np.vstack(
         [la.block_diag(base.axes, base.axes).T @ rigid_rows(base.point, bases[0]) for base in bases]
     ).T  # fmt: skip
@@ -297,7 +296,7 @@ def base_rows(on: OnBases) -> list[OutputRows]:
     per_mass = to_net[:3] / float(on.body.moments.m)
     names = [
         Output(f"mean acceleration {axis}", "acceleration", unit_of("acceleration", units), "mean acceleration",
-               "net force of the bases over the mass")
+               "net force of the bases divided by the mass")
         for axis in DIRECTIONS[:3]
     ]  # fmt: skip
     rows.append(OutputRows(names, per_mass @ E, per_mass @ D))
@@ -316,7 +315,7 @@ def observed_rows(on: OnBases, each: Observed) -> list[OutputRows]:
                 found.append(rows_of(on, motion_outputs(place, wish, units), place.rows, 2, place.rows @ on.held.T))
             elif wish == "displacement":
                 own = np.zeros((len(place.rows), n_s))
-                if len(on.bases) > 1:  # relative to the rigid motion of the first base; zero with one base
+                if len(on.bases) > 1:  # minus the rigid motion with the first base; zero with one base
                     own = place.rows @ on.held.T
                     own[:, :6] -= rigid_rows(place.point, on.bases[0])[: len(own)]
                 found.append(rows_of(on, motion_outputs(place, wish, units), place.rows, 0, own))
@@ -385,7 +384,7 @@ def held_rows(body: ReducedBody, bases: Sequence[Base]) -> tuple[Array, Array]:
 def held_points(body: ReducedBody, interface: ReducedInterface) -> list[tuple[Array, Array]]:
     """Return points of an interface, mesh coordinates, with the three or six rows of their motion over x, mesh axes.
 
-    The reference point; each member by itself where the interface has no reference node of its own.
+    This is the reference point, or each member if the interface has no reference node of its own.
     """
     frame = body.frame
     if interface.kind == "nodes" and not (len(interface.members) == 1 and interface.has_rotation):

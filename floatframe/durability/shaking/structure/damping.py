@@ -35,12 +35,12 @@ class Damping:
     own
         Whether the damping of the body or of the dampers of the system is used.
     heavy
-        Whether ratios above 0.2 are meant; without it such ratios are refused. `Q` needs no confirmation.
+        Whether ratios above 0.2 are intended; otherwise they are refused. `Q` needs no confirmation.
 
     Raises
     ------
     ModelError
-        If nothing or a contradiction is given, or a ratio is not between 0 and 1.
+        If nothing is given, entries contradict each other, or a ratio is not between 0 and 1.
     """
 
     ratio: float | None = None
@@ -90,7 +90,7 @@ class Damping:
         Raises
         ------
         ModelError
-            If a mode gets no ratio, or there is no mode of a number in `modes`.
+            If a mode has no ratio, or a number in `modes` is not that of a mode.
         """
         zeta = np.full(len(frequencies), np.nan if self.ratio is None else self.ratio)
         if len(self.table):
@@ -106,8 +106,7 @@ class Damping:
             k = int(np.flatnonzero(np.isnan(zeta))[0])
             raise ModelError(
                 f"damping: mode {k + 1} at {frequencies[k]:.4g} Hz is in none of the bands and no ratio is given "
-                "for all; "
-                "give a ratio besides, or a band that holds it"
+                "for all modes; give such a ratio, or a band that contains the mode"
             )
         return zeta
 

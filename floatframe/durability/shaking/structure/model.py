@@ -3,8 +3,9 @@
     eta_ddot + C eta_dot + diag(omega²) eta = B_0 s + B_1 s_dot + B_2 s_ddot
     y = Σ_r E_r d^r eta/dt^r + D_r d^r s/dt^r,  r = 0, 1, 2
 
-An input is the r-th rate of its s: r = 2 for the acceleration of a base, whose displacement is s, r = 0 for a force. No
-base is held by a huge mass: s is prescribed, and what it takes to move it so is an output (docs/shake.md).
+An input is the r-th derivative of its s: r = 2 for the acceleration of a base, whose displacement is s; r = 0 for a
+force. There is no large mass on the base: s is prescribed, and the force that moves the base is an output
+(docs/shake.md).
 """
 
 from dataclasses import dataclass, field, replace
@@ -117,11 +118,11 @@ class ShakenModel:
         return names.index(name)
 
     def with_frequencies(self, factor: float) -> "ShakenModel":
-        """Return the model with all frequencies times a factor and the same damping ratios: with another stiffness.
+        """Return the model with another stiffness: all frequencies times a factor, with the same damping ratios.
 
-        What acts through the stiffness or the damping goes by factor² or factor: forces and stresses of displacements
-        and velocities, and the part of the base that excites modes so. How forces are written, by displacements or by
-        accelerations, then makes no difference.
+        Coefficients of stiffness are multiplied by factor², those of damping by factor: in the forces and stresses due
+        to displacements and velocities, and in the excitation of modes by the base. The result is then the same whether
+        forces are written with displacements or with accelerations.
         """
         stiffer = factor ** np.array([2.0, 1.0, 0.0])[:, None, None]
         by_output = np.where([follows_stiffness(each) for each in self.outputs], stiffer[:, :, 0], 1.0)[:, :, None]

@@ -27,10 +27,10 @@ MOST_NODES = 500  #: largest number of nodes of an element or set
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class Observed:
-    """A place at which something is observed; one of interface, node, element, set, position and point says where.
+    """An observed place, given by one of interface, node, element, set, position and point.
 
-    An element or a set is each of its kept nodes. The displacement is relative to the (first) base; the stress has its
-    components in mesh axes.
+    An element or a set stands for each of its kept nodes. The displacement is relative to the (first) base; the
+    components of stress are in mesh axes.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class Observed:
     interface
         Name of an interface.
     node
-        The user's number; "INSTANCE.number" where instances have the same numbers.
+        The user's number of a node; "INSTANCE.number" if instances have the same numbers.
     element
         Number of an element, in the same notation.
     set
@@ -49,11 +49,11 @@ class Observed:
     point
         Stress point of the file, by name.
     quantities
-        Quantities, of `QUANTITIES`; (): acceleration, or stress at a stress point.
+        Names in `QUANTITIES`; (): acceleration, or stress at a stress point.
     tolerance
         Largest distance of a kept node from the position, relative to the size of the body.
     body
-        Name of the body of a system; "position" is then also one on a rigid body.
+        Name of the body of a system; `position` may then also be on a rigid body.
     sensor
         Name of a sensor of a system, instead of a place.
     recovery
@@ -85,7 +85,7 @@ class Observed:
         default = ("stress",) if self.point is not None else ("acceleration",)
         object.__setattr__(self, "quantities", wanted or default)
         if self.point is not None and self.quantities != ("stress",):
-            raise ModelError(f"{where}: a stress point has stress only, got {', '.join(self.quantities)}")
+            raise ModelError(f"{where}: expected stress alone at a stress point, got {', '.join(self.quantities)}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,11 +105,11 @@ def found_places(body: ReducedBody, each: Observed) -> list[Place]:
     Raises
     ------
     ModelError, BodyError
-        If there is no such place (with the nearest), or no stress where some is wanted.
+        If there is no such place (the message suggests the nearest), or a requested stress does not exist.
     """
     where, frame = f"shake: output {each.name!r}", body.frame
     if each.sensor is not None or each.body not in (None, body.name):
-        raise ModelError(f"{where}: sensors and other bodies are those of a system; this is body {body.name!r} alone")
+        raise ModelError(f"{where}: sensors and other bodies exist only in a system; this is body {body.name!r} alone")
     if each.interface is not None:
         interface = body.interface(each.interface)
         point = frame.origin + frame.axes @ interface.position

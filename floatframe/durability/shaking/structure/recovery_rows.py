@@ -1,9 +1,8 @@
 """Rows of a recovery table of a body as outputs: element forces, stresses and motions requested at the reduction.
 
-y = D_0 z + D_1 z_dot + D_2 z_ddot + L p (`cms.body.RecoveryTable`), z = (d, theta, q). The loads p at an interface that
-is the only one of its base are what the base exerts there, W lam, with W from the point of the base to that of the
-interface; further forces are inputs. Of positions and velocities those are taken off that the first base carries
-rigidly.
+y = D_0 z + D_1 z_dot + D_2 z_ddot + L p (`cms.body.RecoveryTable`), z = (d, theta, q). If an interface is the only one
+of its base, its loads are p = W lam, the force of the base, with W from the point of the base to that of the interface;
+other forces are inputs. The rigid motion with the first base is subtracted from positions and velocities.
 """
 
 import numpy as np
@@ -85,7 +84,8 @@ def interface_loads(
             raise ModelError(
                 f"shake: recovery {table.name!r}: its rows depend on how the force of base {base.name!r} is shared "
                 "among "
-                f"{', '.join(base.holds)}; give each interface a base of its own, or make the table without loads there"
+                f"{', '.join(base.holds)}; give each interface a base of its own, or make the table without loads at "
+                "these interfaces"
             )
         if own:
             interface = body.interface(base.holds[0])

@@ -1,8 +1,8 @@
 """A system on bases: its connections to the ground are moved, about the equilibrium at rest.
 
-`linearize` has the equations with the base as an input and z about the shape that follows it quasi-statically. Here
-they are
-brought into the modes of (K, M), and the forces of the bases are summed from the reactions of what they hold.
+`linearize` returns the equations with the base motion as an input, and z relative to the quasi-static motion with the
+base. Here they are transformed to the modes of (K, M), and the forces of each base are the sum of the reactions of its
+connections.
 """
 
 from collections.abc import Mapping, Sequence
@@ -72,14 +72,15 @@ def bases_of_system(
     Parameters
     ----------
     bases
-        Name -> joints, springs and bushings on the ground that it holds; one of them; None: a base with all of them.
+        Joints, springs and bushings on the ground that each base holds, by name of the base; or one of their names;
+        None: one base with all of them.
     points
-        Reference point of a base by name; default: mean of the markers it holds.
+        Reference point of a base by name; default: mean of the markers that it holds.
     """
     there = grounded(system)
     if not there:
         raise ModelError(
-            f"shake: system {system.name!r} has no joint, spring or bushing on the ground: nothing could move it"
+            f"shake: system {system.name!r} has no joint, spring or bushing on the ground that could move it"
         )
     if bases is None:
         bases = {"base": tuple(there)}
@@ -128,7 +129,7 @@ class Rows:
     columns: list[Column]
     weights: Array  #: W, (n_out, n_columns)
     is_relative: bool = (
-        False  #: what the first base alone would carry along is taken off: positions become displacements
+        False  #: whether the rigid motion with the first base is subtracted, so that positions become displacements
     )
 
 
@@ -141,18 +142,20 @@ def shaken_system(
 ) -> ShakenModel:
     """Return a system on its bases, linear about its equilibrium at rest.
 
-    With ratios, they take the place of all dampers; a mode's damping then acts where its stiffness does, so that a
-    reaction has 2 zeta/omega times the rate of its elastic part and the bases exert the rate of the momentum. With
-    `own` the dampers and the damping of the bodies act, and couple the modes.
+    Damping ratios replace all dampers. The damping of a mode then acts at the same places as its stiffness: a reaction
+    contains 2 zeta/omega times the rate of its elastic part, and the net force of the bases is the rate of the
+    momentum. With `own`, the dampers and the damping of the bodies act, and couple the modes.
 
     Raises
     ------
     ModelError
-        If something stays free while the bases stand still, or forces are circulatory (K is not symmetric).
+        If a motion remains free with fixed bases, or forces are circulatory (K is not symmetric).
     """
     where, bases = f"shake: system {system.name!r}", tuple(bases)
     if forces:
-        raise ModelError(f"{where}: force {forces[0]!r}: forces besides the bases are known of single bodies only")
+        raise ModelError(
+            f"{where}: force {forces[0]!r}: forces in addition to the bases are supported only for single bodies"
+        )
     about = static_equilibrium(system)
     inputs = [
         BaseMotion(f"{base.name}:{name}", np.eye(3)[k % 3], "translation" if k < 3 else "rotation", base.point,
@@ -170,8 +173,8 @@ def shaken_system(
     linear, _ = linearize(system, about, inputs=inputs, outputs=list(columns.values())).with_mass()
     if linear.states:
         raise ModelError(
-            f"{where}: state {linear.states[0]!r}: elements and user forces with states of their own are no part of a "
-            "structure with modes; take their forces without states, or integrate the motion"
+            f"{where}: state {linear.states[0]!r}: elements and user forces with states of their own are not supported "
+            "in a modal structure; take forces without states, or integrate the motion"
         )
     require_symmetric(where, linear)
     omega, Z = modes(where, linear)
@@ -184,7 +187,7 @@ def shaken_system(
     at = {name: k for k, name in enumerate(linear.outputs)}
     L = np.stack([linear.L, linear.L_rate, linear.L_acceleration])
     D = np.stack([linear.D, linear.D_rate, linear.D_acceleration])
-    if not damping.own:  # forces have no part of dampers; velocities stay
+    if not damping.own:  # removes the contribution of dampers from forces; velocities stay
         by_damper = [
             not is_velocity(system, columns[n], u) for n, u in zip(linear.outputs, linear.output_units, strict=True)
         ]
@@ -248,9 +251,9 @@ def require_symmetric(where: str, linear: LinearSystem) -> None:
         defect = float(np.abs(matrix - matrix.T).max() / np.abs(matrix).max())
         if defect > SYMMETRIC:
             raise ModelError(
-                f"{where}: {name} about its equilibrium is not symmetric (by {defect:.1e}): followers or couplers "
-                "feed energy "
-                "in, and it has no real modes; take `floatframe response` with a base motion as its input"
+                f"{where}: {name} about its equilibrium is not symmetric (by {defect:.1e}): follower forces or "
+                "couplers feed energy in, so that it has no real modes; take `floatframe response` with a base motion "
+                "as its input"
             )
 
 
@@ -261,9 +264,8 @@ def modes(where: str, linear: LinearSystem) -> tuple[Array, Array]:
     free = int((omega2 <= FREE * omega2[-1]).sum())
     if free:
         raise ModelError(
-            f"{where}: {free} motion{'s' if free > 1 else ''} cost no energy, or leave the equilibrium, while the "
-            "bases stand "
-            "still: hold them by joints or springs"
+            f"{where}: {free} motion{'s' if free > 1 else ''} with fixed bases without energy, or away from the "
+            "equilibrium; hold them by joints or springs"
         )
     return np.sqrt(omega2), Z
 
@@ -316,7 +318,7 @@ def mean_rows(net: Rows, mass: float, system: System) -> Rows:
             "acceleration",
             unit,
             "mean acceleration",
-            "net force of the bases over the mass",
+            "net force of the bases divided by the mass",
         )
         for axis in DIRECTIONS[:3]
     ]
@@ -329,9 +331,11 @@ def observed_rows(system: System, about: Equilibrium, each: Observed) -> list[Ro
     if each.sensor is not None:
         return [sensor_rows(system, about, each)]
     if each.recovery is not None:
-        raise ModelError(f"{where}: recovery tables are those of single bodies; this is a system")
+        raise ModelError(f"{where}: recovery tables exist only for single bodies; this is a system")
     if each.body is None:
-        raise ModelError(f"{where}: expected body: the name of one, {', '.join(body.name for body in system.bodies)}")
+        raise ModelError(
+            f"{where}: expected body = the name of a body, one of {', '.join(body.name for body in system.bodies)}"
+        )
     way = {key: getattr(each, key) for key in ("position", "node", "element", "set") if getattr(each, key) is not None}
     words = ", ".join([each.body, *([each.interface] if each.interface else []), *(f"{k} {v}" for k, v in way.items())])
     found = []

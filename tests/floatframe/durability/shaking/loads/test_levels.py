@@ -37,9 +37,9 @@ def test_other_units_are_the_same_level():
 @pytest.mark.parametrize(
     ("rows", "unit", "words"),
     [
-        ([(10, 1.0), (20, 0.0)], "g2/Hz", r"row 2: 0 g2/Hz at 20 Hz: a level must stay above 0"),
+        ([(10, 1.0), (20, 0.0)], "g2/Hz", r"row 2: 0 g2/Hz at 20 Hz: expected a level above 0"),
         ([(10, 1.0), (20, -1.0)], "g2/Hz", r"row 2: -1 g2/Hz"),
-        ([(10, 1.0), (30, 1.0), (20, 1.0)], "g", r"row 3: 20 Hz after 30 Hz: frequencies must rise"),
+        ([(10, 1.0), (30, 1.0), (20, 1.0)], "g", r"row 3: 20 Hz after 30 Hz: expected increasing frequencies"),
         ([(10, 1.0), (10, 2.0)], "g", r"row 2: 10 Hz after 10 Hz"),
         ([(0, 1.0), (10, 2.0)], "g", r"row 1: frequency 0 Hz"),
         ([(10, float("nan")), (20, 2.0)], "g", r"row 1: nan"),

@@ -165,7 +165,7 @@ def test_the_largest_to_expect_is_that_of_simulated_noise():
     ("given", "words"),
     [
         ({}, "either level"),
-        ({"level": Level.of([(5, 1), (9, 1)])}, "is no density"),
+        ({"level": Level.of([(5, 1), (9, 1)])}, "expected the unit of a density"),
         ({"level": WHITE, "cross": [CrossSpectrum("x", "y", 0.5)]}, "inputs that act at once"),
         ({"levels": {"x": WHITE}, "cross": [CrossSpectrum("x", "y", 1.5)]}, "expected 0 to 1"),
         ({"level": WHITE, "duration": 0.0}, "seconds above 0"),

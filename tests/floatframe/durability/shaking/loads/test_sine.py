@@ -109,7 +109,7 @@ def test_uncertain_frequencies_widen_a_peak_and_factors_raise_it():
     ("level", "rate", "direction", "words"),
     [
         (Level.of([(5, 1), (50, 1)], "g2/Hz"), None, "z", "that of a random test"),
-        (LEVEL, -1.0, "z", "octaves a minute above 0"),
+        (LEVEL, -1.0, "z", "octaves per minute above 0"),
         (LEVEL, None, "w", "no base direction"),
         (LEVEL, None, "rx", "unit g for direction rx"),
         (Level.of([(5, 1), (50, 1)], "rad/s2"), None, "z", "unit rad/s2 for direction z"),

@@ -49,11 +49,11 @@ def test_a_slope_between_two_levels_meets_both():
     [
         ([], "got none"),
         ([[20, 80, "3 dB/oct"]], "no band has a level"),
-        ([[20, 80, 0.1], [90, 100, 0.1]], "begins at 90 Hz, and the one before ends at 80 Hz"),
+        ([[20, 80, 0.1], [90, 100, 0.1]], "begins at 90 Hz, but the previous band ends at 80 Hz"),
         ([[20, 80, 0.1], [80, 100, 0.2]], "band 2: a step from 0.1 to 0.2"),
         ([[80, 20, 0.1]], "rising frequencies above 0"),
         ([[0, 20, 0.1]], "rising frequencies above 0"),
-        ([[20, 80, 0.0]], "must stay above 0"),
+        ([[20, 80, 0.0]], "expected a level above 0"),
         ([[20, 80, "steep"]], 'expected a slope such as "\\+3 dB/oct"'),
         ([[20, 80, "3 dB"]], "expected a slope"),
         ([[20, 80, "1e9 dB/oct"]], "expected a slope"),

@@ -325,10 +325,10 @@ def test_places_that_do_not_exist_are_refused(solid, wanted, words):
 @pytest.mark.parametrize(
     ("bases", "words"),
     [
-        (None, "name the one that is the base"),
+        (None, "name the one that the base holds"),
         ("lft", "left"),
         ({"a": ("left",), "b": ("left",)}, "held by two bases"),
-        ({"a": ()}, "expected one interface at least"),
+        ({"a": ()}, "expected at least one interface"),
     ],
 )
 def test_bases_that_do_not_exist_are_refused(solid, bases, words):
@@ -339,7 +339,7 @@ def test_bases_that_do_not_exist_are_refused(solid, bases, words):
 def test_a_body_whose_modes_cannot_follow_two_bases_is_refused():
     part = cms.couple(bar(nx=3))
     body = cms.reduce(part, cms.modes.normal_modes(part, n_modes=4))
-    with pytest.raises(ModelError, match="cannot follow motions of the bases against each other"):
+    with pytest.raises(ModelError, match="cannot follow relative motions of the bases"):
         shaken_body(body, bases_of_body(body, {"a": ("left",), "b": ("right",)}), Damping(ratio=0.01))
 
 
