@@ -8,9 +8,9 @@ marker b:
     along e:    F = -k_a d_z - d_a d_z'
     moment:     M = -k_t e x s - d_t s x (w x s)             e x s = (-s_y, s_x, 0)
 
-None of them has a moment about the axis of the shaft. The axes are those of the housing, because a damper in axes that
-rotate with the rotor would drive it. The skew-symmetric part of K has no energy; its power, which may drive the shaft,
-is counted as loss.
+None of these loads has a moment about the axis of the shaft. The axes are those of the housing, because a damper in
+axes that rotate with the rotor would drive it. The skew-symmetric part of K has no energy; its power, which may drive
+the shaft, is counted as loss.
 """
 
 from collections.abc import Callable
@@ -65,8 +65,8 @@ class Bearing(Element):
     tilt_stiffness: float = 0.0  #: tilting stiffness k_t [N m/rad]
     tilt_damping: float = 0.0  #: tilting damping d_t [N m s/rad]
     axis: Array = (0.0, 0.0, 1.0)  # type: ignore[assignment]  #: e, in the axes of marker a, (3,)
-    #: direction of x, in the axes of marker a, (3,); None: the axis of a that follows the one nearest to `axis`: x for
-    #: z
+    #: direction of x in the axes of marker a, (3,); None: the axis of a that follows the axis closest to `axis` in
+    #: cyclic order: x after z
     x_axis: Array | None = None
     shaft_axis: Array | None = None  #: direction s of the shaft in axes of marker b, (3,); None: equal to `axis`
 

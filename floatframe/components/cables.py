@@ -2,7 +2,7 @@
 
 With l the sum of the distances between consecutive points, e = l - l_0, and d_i the direction from point i to the next:
 
-    T = k e + c l_dot where this is above zero and e > 0, else 0;      force on point i:  T (d_i - d_(i-1))
+    T = k e + c l_dot if this is above zero and e > 0, else 0;      force on point i:  T (d_i - d_(i-1))
 
 The cable runs over its inner points without friction, so its tension is the same everywhere.
 """
@@ -71,12 +71,13 @@ class Cable(Element):
         if min(parts) == 0:
             k = parts.index(0.0)
             raise ModelError(
-                f"element {self.name!r}: points {k + 1} and {k + 2} coincide as placed: no direction to pull in"
+                f"element {self.name!r}: points {k + 1} and {k + 2} coincide as placed, so that the cable has no "
+                "direction there"
             )
         length = sum(parts) - (self.preload or 0.0) / self.stiffness if self.length is None else self.length
         if length <= 0:
             raise ModelError(
-                f"element {self.name!r}: preload: {self.preload:g} stretches the cable by more than it is long; give a "
+                f"element {self.name!r}: preload: {self.preload:g} stretches the cable by more than its length; give a "
                 "greater stiffness or a smaller preload"
             )
         outputs = [("tension", "N"), ("length", "m"), ("slack", "m"), ("energy", "J"), ("power lost", "W")]

@@ -1,13 +1,13 @@
 """Stick-slip friction along or about an axis, modelled by the deflection of bristles, without creep while sticking.
 
-v is the sliding velocity, z the mean deflection of the bristles, and z_ss(v) = G(v)/sigma_0 that in steady sliding:
+v is the sliding velocity, z the mean deflection of the bristles, and z_ss(v) = G(v)/sigma_0 the steady value:
 
     G(v) = F_C + (F_S - F_C) exp(-(v/v_S)²)
     dz/dt = v (1 - alpha(z, v) z/z_ss sign(v)),      F = sigma_0 z + sigma_1 dz/dt + sigma_2 v
 
 Canudas de Wit and others (1995) use alpha = 1 (LuGre). The bristles then slip slightly under any oscillating load, so
-that a contact that should stick creeps. In the model of Dupont et al. (2002), alpha is 0 while |z| is below a fraction
-of z_ss (the deflection is elastic) or decreases, 1 for |z| >= z_ss, and rises smoothly in between.
+that a contact that should stick creeps. In the model of Dupont et al. (2002), alpha is 0 if |z| decreases or is below a
+fraction of z_ss (elastic deflection), 1 for |z| >= z_ss, and smooth in between.
 """
 
 import math
@@ -39,7 +39,8 @@ MOTIONS = {"along": ("N", "m", "m/s"), "about": ("N m", "rad", "rad/s")}  #: uni
 class BristleFriction(Element):
     """Friction between markers b and a, for sliding along an axis or rotation about it, which can stick.
 
-    Up to `static`, it holds like a stiff spring. Beyond, it slips with `coulomb` and, near rest, with up to `static`.
+    Up to the force `static`, the contact acts like a stiff spring. Beyond it, the contact slips with the friction
+    `coulomb`, which rises to `static` near rest.
     Use the markers of the joint in which the friction acts; its level does not depend on the force in the joint.
 
     Raises
@@ -74,12 +75,12 @@ class BristleFriction(Element):
             object.__setattr__(self, key, number(f"{where}: {key}", getattr(self, key), at_least=0.0))
         object.__setattr__(self, "speed", number(f"{where}: speed", self.speed))
         if self.elastic >= 1:
-            raise ModelError(f"{where}: elastic: expected a part below 1, got {self.elastic:g}")
+            raise ModelError(f"{where}: elastic: expected a fraction below 1, got {self.elastic:g}")
         static = self.coulomb if self.static is None else number(f"{where}: static", self.static, above=0.0)
         if static < self.coulomb:
             raise ModelError(
-                f"{where}: static: expected coulomb = {self.coulomb:g} at least, got {static:g}: friction "
-                "that is larger when sliding would never stick"
+                f"{where}: static: expected at least coulomb = {self.coulomb:g}, got {static:g}: "
+                "a contact with larger friction in sliding would never stick"
             )
         if static > self.coulomb and self.stribeck_speed is None:
             raise ModelError(f"{where}: stribeck_speed: missing; static falls to coulomb over this speed")

@@ -79,8 +79,8 @@ def depth_force(depth, rate, data, at):
 def add_contact(wrench, x, p, out, way, play, data, at):
     """Add the contact between the pin of marker 1 and the bearing of marker 0, at a point of the pin.
 
-    p: the point, in ground axes. out: vector from the middle of the bearing to it (distance times outward direction).
-    play: free distance. Return the normal force, the stored energy and the dissipated power.
+    p: the point, in ground axes. out: vector from the middle of the bearing to the point (distance times outward
+    direction). play: free distance. Return the normal force, the stored energy and the dissipated power.
     """
     mu, slow, radius = data[at + 3], data[at + 4], data[at + 5]
     none = 0.0 * way

@@ -44,15 +44,15 @@ class AntiSkidBrake(Element):
     R:
 
     (1) sensor: d omega_s/dt = (omega - omega_s)/sensor_time
-    (2) reference speed: dv/dt = (v_w - v)/reference_time, but v falls by `reference_deceleration` at most, as the speed
-        of the vehicle does; a faster fall is attributed to the wheel
-    (3) slip s = (v - v_w)/max(v, drop_out); skid e = the larger of (s - slip)/slip_band and, where `deceleration` is
+    (2) reference speed: dv/dt = (v_w - v)/reference_time, where v decreases at most by `reference_deceleration`, like
+        the speed of the vehicle; a faster decrease is attributed to the wheel
+    (3) slip s = (v - v_w)/max(v, drop_out); skid e = the larger of (s - slip)/slip_band and, if `deceleration` is
         given, (-dv_w/dt - deceleration)/deceleration_band
     (4) valve: dp_v/dt = build_rate for e <= -1, falls linearly to zero at e = 0, and on to -release_rate for e >= 1;
         p_v stays between zero and the pilot's pressure (it approaches these limits with `time_constant`)
     (5) brake: dp/dt = (p_v - p)/time_constant, torque -gain p tanh(omega/friction_speed)
 
-    Between drop_out/2 and `drop_out` of the reference speed, a cubic blends (4) out, so that the vehicle can stop; with
+    For reference speeds between drop_out/2 and `drop_out`, a cubic blends (4) out, so that the vehicle can stop. With
     `anti_skid = False`, (4) never acts.
     """
 

@@ -16,8 +16,8 @@ __all__ = ["ANTI_WINDUP", "Pid", "pid_law", "target_of"]
 
 ANTI_WINDUP = ("none", "clamping", "back-calculation")
 NONE, CLAMPING, BACK_CALCULATION = range(3)
-#: width of the smooth transition at a limit, relative to the range between both limits; with one limit, relative to its
-#: magnitude, or, if it is 0, to kp e plus what ki e adds in one second
+#: width of the smooth transition at a limit, relative to the range between both limits; with a single limit, relative
+#: to its magnitude or, if it is 0, to kp e plus the integral of ki e over one second
 BAND = 1e-3
 PROPORTIONAL, INTEGRAL, DERIVATIVE, FILTER, LOW, HIGH, MODE, TRACKING, WIDTH, TARGET = range(10)
 

@@ -98,11 +98,11 @@ def exact_beams(
     model = body.element_model
     if not isinstance(model, BeamModel) or not len(model.dofs):
         raise ModelError(
-            f"{where}: body {body.name!r} is not made of beams alone; take a body of lines with sections, and for a "
-            "solid or a shell one in parts"
+            f"{where}: body {body.name!r} does not consist of beams alone; take a body of lines with sections, or "
+            "divide a solid or a shell into parts"
         )
     if body.recovery is not None and linked(body, model):
-        raise ModelError(f"{where}: body {body.name!r} has rigid links, which these beams do not know; leave them out")
+        raise ModelError(f"{where}: body {body.name!r} has rigid links, which exact beams do not support; remove them")
     if pieces < 1 or not 0 <= damping < np.inf:
         raise ModelError(f"{where}: expected pieces from 1 and damping from 0, got {pieces} and {damping:g}")
     origin = array_of_shape(f"{where}: position", np.zeros(3) if position is None else position, (3,))
@@ -158,8 +158,8 @@ def exact_beams(
     for interface in body.interfaces:
         if len(interface.nodes) != 1 or called[interface.nodes[0]] not in lumps:
             raise ModelError(
-                f"{where}: interface {interface.name!r} has {len(interface.nodes)} nodes; a beam is met at one node of "
-                "its lines"
+                f"{where}: interface {interface.name!r} has {len(interface.nodes)} nodes; expected a single node of "
+                "the lines"
             )
         node = interface.nodes[0]
         arm = interface.reference - model.nodes[node]
@@ -185,7 +185,7 @@ def piece_stiffness(K_local: Array, L: float, pieces: int) -> Array:
     E = np.zeros((6, 6))
     E[3:, :3] = tilde(E_X)
     arm = np.eye(6)
-    arm[:3, 3:] = -tilde(L / 2 * E_X)  # motion of the middle, carried by the first end
+    arm[:3, 3:] = -tilde(L / 2 * E_X)  # motion of the middle with the first end
     other = np.eye(6)
     other[:3, 3:] = tilde(L / 2 * E_X)
     # relative motion at the middle, for a force at the middle on the second end and a fixed first end

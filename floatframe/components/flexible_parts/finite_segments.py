@@ -81,7 +81,7 @@ def floating_parts(
     for number, body in enumerate(reduced, start=1):
         if stiffening and body.geometric is None:
             raise ModelError(
-                f"{where}: body {body.name!r} has no geometric stiffness; reduce it with geometric=True, or ask for "
+                f"{where}: body {body.name!r} has no geometric stiffness; reduce it with geometric=True, or give "
                 "stiffening=False"
             )
         a, b = (body.frame.origin + body.frame.axes @ body.interface(end).position for end in ends)

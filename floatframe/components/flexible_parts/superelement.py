@@ -155,7 +155,7 @@ def node_inertias(
     middle, moments = (a.position + b.position) / 2, body.moments
     Psi = carried(b, middle) - carried(a, middle)
     K_p = relative_stiffness(where, body, a, b)
-    # modes of the static shape for nodal motions (u_a, u_b): q = K⁻¹ Psiᵀ K_p (X_b - X_a)
+    # modal coordinates of the static shape for nodal motions (u_a, u_b): q = K⁻¹ Psiᵀ K_p (X_b - X_a)
     to_middle = [rigid(middle - interface.position) for interface in (a, b)]
     q = (Psi.T / np.diag(body.K)[:, None]) @ K_p @ np.hstack([-to_middle[0], to_middle[1]])
     # rigid motion of B about its origin: u_a = rigid x + Psi_a q
@@ -182,8 +182,9 @@ def node_inertias(
         center = J - (S @ S * np.eye(3) - np.outer(S, S)) / m if m > 0 else -np.eye(3)
         if np.linalg.eigvalsh(center)[0] < 0:
             raise ModelError(
-                f"{where}: the share of interface {interface.name!r} of body {body.name!r} in mass and inertia is no "
-                f"rigid body (mass {m:.4g}); take a `FlexibleBody`, or bodies whose mass lies between their interfaces"
+                f"{where}: the share of interface {interface.name!r} of body {body.name!r} in mass and inertia is not "
+                f"that of a rigid body (mass {m:.4g}); take a `FlexibleBody`, or bodies whose mass lies between their "
+                "interfaces"
             )
         done.append((m, C.T @ S, C.T @ J @ C))
     return done[0], done[1]

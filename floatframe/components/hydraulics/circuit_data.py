@@ -215,7 +215,7 @@ def add_cylinder(made: Builder, each: Cylinder, marker: int, placed: Placed) -> 
     length = float(np.linalg.norm(placed.r[marker + 1] - placed.r[marker]))
     stroke = length - each.retracted_length
     if length == 0.0:
-        raise ModelError(f"component {each.name!r}: its markers are at one place as placed, so it has no direction")
+        raise ModelError(f"component {each.name!r}: its markers coincide as placed, so that it has no direction")
     if not -1e-9 * each.stroke <= stroke <= (1 + 1e-9) * each.stroke and each.stop_stiffness == 0:
         raise ModelError(
             f"component {each.name!r}: its markers are {length:.6g} apart as placed, stroke {stroke:.6g}; expected "

@@ -9,10 +9,9 @@ U(p) the oil in accumulators.
     stops at both ends;
 (3) a pump or motor of displacement D has the flow q = D omega and the torque D (h_a - h_b);
 (4) a pipe's flow has inertia, I dq/dt = h_a - h_b - R q - c q |q|;
-(5) the content (V + C (p - p_a) + U)/v of each node is conserved:  dp/dt (v (C + dU/dp) - (V + C (p - p_a) + U) dv/dp)
-    = v (v Q
-- dV/dt),
-    with Q the sum of the flows into it.
+(5) the content (V + C (p - p_a) + U)/v of each node is conserved:
+    dp/dt (v (C + dU/dp) - (V + C (p - p_a) + U) dv/dp) = v (v Q - dV/dt),
+    with the sum Q of the flows into the node.
 
 The energy of nodes and pipes grows by exactly the energy that supplies add, minus losses and the work on bodies.
 """
@@ -136,7 +135,9 @@ def circuit_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
             elif how != ALWAYS:
                 u = outputs[at] if how == BY_SPOOL else -outputs[at]
                 part = (u - data[n + 4]) / (1.0 - data[n + 4])
-            if part.real < 0.0 or (part.real == 0.0 and how == BY_SPOOL_BACK):  # a spool in the middle has one slope
+            if part.real < 0.0 or (
+                part.real == 0.0 and how == BY_SPOOL_BACK
+            ):  # a centred spool has the slope of one path only
                 part = 0.0 * part
             q = part * data[n] * turbulent(dp, data[n + 1]) + data[n + 5] * dp
             outputs[s] = q
@@ -157,7 +158,7 @@ def circuit_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
             outputs[s] = q
             outputs[total + 1] += q * drop
             outputs[total + 2] += 0.5 * data[n] * q * q
-        elif kind == FLOW:  # at
+        elif kind == FLOW:  # parameters: index of the function
             q = function_at(data, int(data[n]), t) + 0.0 * dp
             outputs[s] = q
             outputs[total] += q * (h_b - h_a)
@@ -220,12 +221,12 @@ def circuit_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
 def circuit_rest(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write results as `circuit_law`, with pressure rates that are easier to solve and have the same zeros.
 
-    The flow Q into a node depends on roots of pressure differences, with which Newton's method steps back and forth
-    across the zero. Q sqrt(Q² + Q_0²)/Q_0, with the flow Q_0 at which its orifices become laminar, is proportional to
-    the differences.
+    The flow Q into a node depends on roots of pressure differences, about whose zeros Newton's method would oscillate.
+    Q sqrt(Q² + Q_0²)/Q_0, with the flow Q_0 at which the orifices of the node become laminar, is proportional to the
+    differences.
 
-    For one node of each isolated part, the rate is the error of the content of the part: nothing flows into or out of
-    such a part, so its content at the start determines its pressures at rest.
+    For one node of each isolated part, the rate is the error of the content of the part. Nothing flows into or out of
+    such a part, so that its initial content determines its pressures at rest.
     """
     circuit_law(t, x, z, lam, data, wrench, z_dot, g, outputs)
     for i in range(int(data[N_FREE])):

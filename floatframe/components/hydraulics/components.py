@@ -107,7 +107,7 @@ class Cylinder:
         for side in ("head", "rod"):
             if getattr(self, side) is not None and getattr(self, f"{side}_dead_volume") == 0:
                 raise ModelError(
-                    f"{where}: {side}_dead_volume: expected a number > 0, got 0: a chamber without any volume at the "
+                    f"{where}: {side}_dead_volume: expected a number > 0, got 0: a chamber without volume at the "
                     "end of its stroke is infinitely stiff; 1 % of the swept volume is usual"
                 )
 
@@ -248,7 +248,7 @@ class Supply:
         if not isinstance(self.pressure, TimeFunction):
             number(f"component {self.name!r}: pressure", self.pressure, above=0.0)
         elif (self.pressure.pieces[:, 1:].any(axis=1) == 0).all() and (self.pressure.pieces[:, 0] <= 0).any():
-            raise ModelError(f"component {self.name!r}: pressure: expected absolute pressures > 0, got one that is not")
+            raise ModelError(f"component {self.name!r}: pressure: expected absolute pressures > 0, got zero or less")
         checked(self, functions=("pressure",))
 
 

@@ -9,7 +9,7 @@ exponent n, and vapour below the vapour pressure p_v. The cavities are as large 
 for each width d = (p_a - p_v)/50 below it, and are 2e-22 of the volume at ambient pressure. The pressure therefore
 stays near p_v however much a chamber expands, and every tangent is finite.
 
-h(p), the integral of v from p_a to p, is the work that a unit of volume at ambient pressure carries when it flows in at
+h(p), the integral of v from p_a to p, is the work that a unit of volume at ambient pressure adds when it flows in at
 the pressure p; its internal energy is h - (p - p_a) v. A chamber of volume V has the content V/v and the energy V (h/v
 - (p - p_a)). The rate of this energy is exactly h times the inflow minus (p - p_a) times the rate of V.
 """
@@ -54,7 +54,7 @@ class Fluid:
         if self.viscosity is not None:
             object.__setattr__(self, "viscosity", number("fluid: viscosity", self.viscosity, above=0.0))
         if self.air >= 1.0:
-            raise ModelError(f"fluid: air: expected a part of the volume below 1, got {self.air:g}")
+            raise ModelError(f"fluid: air: expected a fraction of the volume below 1, got {self.air:g}")
         if self.vapour_pressure >= self.ambient:
             raise ModelError(
                 f"fluid: vapour_pressure: expected an absolute pressure below the ambient {self.ambient:g}, got "

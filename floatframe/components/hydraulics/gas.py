@@ -1,6 +1,6 @@
 """The gas of an accumulator: polytropic, behind a bladder that closes the port, with a limit of the oil volume.
 
-Of the gas volume V_0 at the charge pressure p_0, the oil takes U(p) = V_0 (1 - (p_0/p)^(1/n)) for p > p_0 and nothing
+Of the gas volume V_0 at the charge pressure p_0, the oil occupies U(p) = V_0 (1 - (p_0/p)^(1/n)) for p > p_0 and zero
 below it, up to a limit U_m, which is reached at p_m = p_0 (1 - U_m/V_0)^-n. The two corners are rounded by cubics over
 the pressures (1 - w) p to (1 + w) p, so that U and its slope are continuous and the integral of U is known exactly.
 """

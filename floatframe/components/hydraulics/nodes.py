@@ -90,6 +90,6 @@ def check_nodes(fluid: Fluid, components: Sequence[Component], nodes: Mapping[st
                 )
     if not given and all(node.pressure is None for node in nodes.values()):
         raise ModelError(
-            "nothing sets its pressure: missing supply: give a supply or a tank, or the pressure of a node at the "
-            "start, as in nodes = { head = { pressure = 5e6 } }"
+            "nothing sets its pressure: missing supply: give a supply or a tank, or the initial pressure of a node, "
+            "as in nodes = { head = { pressure = 5e6 } }"
         )

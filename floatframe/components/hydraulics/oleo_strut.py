@@ -94,7 +94,7 @@ class OleoStrut(Element):
         if self.gas_area * self.stroke >= self.gas_volume:
             raise ModelError(
                 f"{where}: gas_volume: expected more than gas_area times stroke = {self.gas_area * self.stroke:.4g}, "
-                f"got {self.gas_volume:.4g}: nothing would be left of the gas when the strut bottoms"
+                f"got {self.gas_volume:.4g}: the gas volume must be above 0 at full stroke"
             )
         for key in ("area", "recoil_area"):
             self._metered(where, key)

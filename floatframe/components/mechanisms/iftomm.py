@@ -53,8 +53,8 @@ def point_pendulum(*, x: float = -1.0, length: float = 1.0, mass: float = 1.0) -
 def n_four_bar(n: int = 2, *, length: float = 1.0, mass: float = 1.0, speed: float = 1.0) -> System:
     """Return n four-bar windows in a row, with 2 n + 1 equal rods: A02 of the library.
 
-    All cranks are initially upright, and their tops move at `speed` along x. When the rods lie on one line, every
-    window could move differently; the constraints are singular there. Bodies "crank 0" to "crank n" and "coupler 1" to
+    All cranks are initially upright, and their tops move at `speed` along x. When all rods are collinear, the windows
+    can move independently; the constraints are singular there. Bodies "crank 0" to "crank n" and "coupler 1" to
     "coupler n"; joints "hinge k", "ball k", "cross k".
     """
     if n < 1:
@@ -158,7 +158,7 @@ def andrews_mechanism(*, torque: float = 0.033) -> System:
 def bricard_mechanism(*, length: float = 1.0, mass: float = 1.0, side: float = 0.1) -> System:
     """Return Bricard's mechanism, with five rods along the edges of a cube between six perpendicular hinges: A04.
 
-    By the count of constraints it could not move, but one constraint is redundant, and the joints share the load
+    It has as many constraints as coordinates, but can move because one is redundant; the joints share the load
     (`redundant = "minimum-norm"`). Bodies "rod 1" to "rod 5"; joints "hinge 1" to "hinge 6", of which the first and the
     last are on the ground. Rod 4 begins at P_3 = (1, -1, 1).
     """

@@ -80,7 +80,7 @@ def chain(
     n
         Number of rods.
     length, mass
-        Of each rigid rod [m, kg].
+        Length and mass of each rigid rod [m, kg].
     angles
         Angle of each rod from the x axis [rad]; zero by default.
     gravity
@@ -90,7 +90,7 @@ def chain(
     ends
         Interfaces of `rod` at its start and end.
     units
-        Default: those of `rod`, or m-kg-s.
+        Units of the system; default: those of `rod`, or m-kg-s.
     """
     if n < 1:
         raise ModelError(f"chain: n: expected at least 1, got {n}")
@@ -229,7 +229,7 @@ def slider_crank(
     ends
         Interfaces of the reduced body, or places of the part.
     units
-        Default: those of a reduced `flexible_rod`, or m-kg-s.
+        Units of the system; default: those of a reduced `flexible_rod`, or m-kg-s.
     """
     if not 0 < crank < rod:
         raise ModelError(f"slider_crank: expected 0 < crank < rod, got crank = {crank:g}, rod = {rod:g}")
@@ -287,7 +287,7 @@ def four_bar(
     flexible_coupler, ends
         A reduced body instead of the coupler, with its interfaces `ends` at pin and knee.
     units
-        Default: those of `flexible_coupler`, or m-kg-s.
+        Units of the system; default: those of `flexible_coupler`, or m-kg-s.
     """
     start = crank * np.array([np.cos(angle), np.sin(angle), 0.0])
     foot = np.array([ground, 0.0, 0.0])
@@ -297,8 +297,8 @@ def four_bar(
     height = coupler**2 - along**2
     if height <= 0:
         raise ModelError(
-            f"four_bar: bars of {crank:g}, {coupler:g}, {rocker:g} over {ground:g} do not close with the crank at "
-            f"{angle:g} rad; coupler and rocker would have to span {d:g}"
+            f"four_bar: bars of {crank:g}, {coupler:g}, {rocker:g} on a base of {ground:g} do not close with the crank "
+            f"at {angle:g} rad, because coupler and rocker would have to span {d:g}"
         )
     e = span / d
     knee = start + along * e + np.sqrt(height) * np.array([-e[1], e[0], 0.0])

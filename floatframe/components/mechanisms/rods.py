@@ -40,7 +40,7 @@ class Rod:
         reduced: ReducedBody | PartMaker | None = None,
         ends: tuple[str, str] = ("start", "end"),
     ) -> None:
-        """Place the rod: a reduced body with its interfaces `ends` at the points, a part with its x axis along them."""
+        """Place the rod between two points: a reduced body by its interfaces `ends`, any other rod by its x axis."""
         start, end = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
         self.length = float(np.linalg.norm(end - start))
         self.joints: tuple[Joint, ...] = ()

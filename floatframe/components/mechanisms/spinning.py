@@ -46,7 +46,7 @@ def satellite(
     hub_mass, hub_radius
         Mass and radius of the hub [kg, m].
     boom_length, boom_mass
-        Mass and length of rigid booms [m, kg]; with `boom`, the length is the distance between its interfaces.
+        Length and mass of rigid booms [m, kg]; with `boom`, the length is the distance between its interfaces.
     spin
         Initial angular velocity about z of hub and undeformed booms [rad/s].
     boom
@@ -54,7 +54,7 @@ def satellite(
     ends
         Interfaces of `boom` at the hub and at the tip.
     units
-        Default: those of `boom`, or m-kg-s.
+        Units of the system; default: those of `boom`, or m-kg-s.
     """
     if boom is not None:
         boom_length = float(np.linalg.norm(np.subtract(*(boom.interface(end).position for end in ends))))
@@ -192,7 +192,7 @@ def rotating_blade(
     hub_radius
         Distance of the root from the axis [m].
     hub_inertia
-        Inertia of the hub about z [kg m²]; default: 1e9 times that of the blade, so that the speed is constant.
+        Inertia of the hub about z [kg m²]; default: 1e9 times the inertia of the blade, so that the speed is constant.
     root
         Interface of the blade.
     stiffening

@@ -88,8 +88,8 @@ class Wheel(NamedTuple):
 def shift_off_the_rail(pair: Pair) -> float:
     """Return the outward shift beyond which a wheel counts as derailed [m].
 
-    With a flange: if it has climbed to within 8 mm of its height; without: if the middle of the wheel leaves the rail
-    head.
+    A wheel with a flange is derailed if the flange has climbed to within 8 mm of its height; a wheel without a flange,
+    if its middle leaves the rail head.
     """
     if not pair.has_flange:
         return float(pair.head.y[-1] - pair.offset)

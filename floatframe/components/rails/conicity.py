@@ -39,7 +39,7 @@ def wheelset_at(pair: Pair, y: Array, *, smoothing: float | None = None) -> tupl
     for i, shift in enumerate(y):
 
         def heights(phi: float, shift: float = float(shift)) -> tuple[float, float, float, float]:
-            # a roll about the axle's centre also moves the centres of both wheels sideways by arm (1 - cos), which is
+            # a roll about the centre of the axle also shifts the centres of both wheels by arm (1 - cos), which is
             # neglected
             found = []
             for side in (1.0, -1.0):
@@ -110,7 +110,9 @@ def equivalent_conicity(
     U = CubicSpline(fine, np.concatenate([[0.0], np.cumsum(0.5 * (f[1:] + f[:-1]) * np.diff(fine))]))
     centre = float(fine[np.argmin(U(fine))])
     if not fine[2] < centre < fine[-3]:
-        raise ModelError("equivalent_conicity: the wheelset is not steered back: delta_r does not rise through zero")
+        raise ModelError(
+            "equivalent_conicity: the wheelset has no restoring effect: delta_r does not rise through zero"
+        )
 
     def turning(low: float) -> float:
         return float(U(low) - U(low + 2 * amplitude))
@@ -128,12 +130,12 @@ def equivalent_conicity(
     middle = left + amplitude
 
     def integrand(angle: float) -> float:
-        # y = middle + a sin(angle) removes the roots at the ends
+        # the substitution y = middle + a sin(angle) removes the singularities at the ends
         height = top - float(U(middle + amplitude * np.sin(angle)))
         return amplitude * np.cos(angle) / np.sqrt(2 * height) if height > 0 else 0.0
 
     half, _ = quad(integrand, -np.pi / 2 + 1e-4, np.pi / 2 - 1e-4, limit=200, epsrel=1e-6)
-    # the two ends are added as constants: the integrand there is nearly a/sqrt(a |f|)
+    # the integrand is nearly constant at the two ends, a/sqrt(a |f|)
     half += 1e-4 * (integrand(-np.pi / 2 + 1e-4) + integrand(np.pi / 2 - 1e-4))
     return float((np.pi / half) ** 2 * scale / 2)
 

@@ -1,10 +1,10 @@
 """The contact between wheel and rail: contact points of rigid bodies, and the smooth quasi-elastic contact.
 
 The position of a wheel relative to its rail is given by u, the outward shift of the wheel, the roll phi (outer side
-up), the yaw psi, and the height h of its centre above the nominal radius. A rail does not change along the track. Of
-the circle of the wheel at s, therefore, only the point matters whose normal is perpendicular to the rail (Wang's line
-of contact, see docs/rails.md). The wheel is reduced to a curve (x, y, z)(s) that faces the profile Z(y) of the rail,
-and its penetration is p(s) = Z(y(s) + u + offset) - z(s) - h.
+up), the yaw psi, and the height h of its centre above the nominal radius. A rail does not change along the track.
+Therefore each circle of the wheel, at s, can touch the rail only at the point whose normal is perpendicular to the rail
+(Wang's line of contact, see docs/rails.md). The wheel is reduced to a curve (x, y, z)(s) that faces the profile Z(y) of
+the rail, and its penetration is p(s) = Z(y(s) + u + offset) - z(s) - h.
 
 - rigid: the local maxima of p within a tolerance of the highest one;
 - quasi-elastic: q = eps log( int w exp(p/eps) dy / L ), a smoothed maximum over heights of about eps. Its gradient is
@@ -253,7 +253,7 @@ def quasi_elastic(
     y = y0 + u[:, None] + pair.offset
     p = pair.head.height(y) - (z + pair.radius)
     best = p.max(axis=1, keepdims=True)
-    best = np.where(np.isfinite(best), best, -1.0)  # off the rail: the value is a depth below any real one
+    best = np.where(np.isfinite(best), best, -1.0)  # off the rail: a depth below all real values
     weights = measure * np.exp((p - best) / smoothing)
     total = weights.sum(axis=1)
     width = pair.typical_width * np.sqrt(smoothing)

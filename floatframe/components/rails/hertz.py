@@ -4,8 +4,7 @@ The distance of the unloaded surfaces is A x² + B y², with A in the direction 
 equal bodies and the complete elliptic integrals K and E of the eccentricity e of the ellipse, k = short/long semi-axis
 (theory in docs/rails.md):
 
-(1)  long axis L, short axis S:   C_L = p_0 k² /(E* S) (K - E)/e² k^-1 ...
-     in the form used here: C_L / C_S = (K - E) / (E/k² - K)
+(1)  ratio of the curvatures along the long axis L and the short axis S:  C_L / C_S = (K - E) / (E/k² - K)
 (2)  L = (3 N E(e) / (2 pi k² (C_L + C_S) E*))^(1/3),  S = k L
 (3)  approach = 3 N K(e) / (2 pi L E*),  so that N = stiffness approach^(3/2)
 """

@@ -102,7 +102,7 @@ class Irregularities:
         steps = np.diff(values["s"])
         if steps.min() <= 0 or np.ptp(steps) > 1e-6 * steps.mean():
             raise ModelError(
-                "irregularities: s: expected equally spaced places that increase; resample the measurement"
+                "irregularities: s: expected equally spaced, increasing positions; resample the measurement"
             )
         for name, array in values.items():
             if name != "s" and np.abs(array).max() > MOST:

@@ -381,9 +381,9 @@ def polach(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options, V):
     """Return Polach's forces (1999, 2005); options = (k_A, k_S, A, B), V the rolling speed.
 
     (1)  friction falls with the slip speed w = V |creepage|: mu (A + (1 - A) exp(-B w))
-    (2)  eta_c = eta + phi a where that is larger than eta, else eta;  nu_c = |(xi, eta_c)|
+    (2)  eta_c = eta + phi a if its magnitude is larger, else eta;  nu_c = |(xi, eta_c)|
     (3)  e = (1/4) pi G a b C_jj nu_c/(mu N),  C_jj² = ((C11 xi)² + (C22 eta)²)/|(xi, eta)|²
-    (4)  F = (2 mu N/pi) (k_A e/(1 + (k_A e)²) + atan(k_S e)), against the creepage
+    (4)  F = (2 mu N/pi) (k_A e/(1 + (k_A e)²) + atan(k_S e)), opposite to the creepage
     (5)  lateral force of spin: (9/16) a mu N K (1 + 6.3 (1 - exp(-a/b))) phi/nu_c,
          K = |e_M| (d³/3 - d²/2 + 1/6) - (1 - d²)^(3/2)/3 < 0,  d = (e_M² - 1)/(e_M² + 1),
          e_M = (8/3) G b sqrt(a b) C23 eta_c/((1 + 6.3 (1 - exp(-a/b))) mu N)

@@ -13,7 +13,7 @@ __all__ = ["GAUGE_DEPTH", "PROFILES", "cone", "inclined", "rail_60e1", "rotated_
 
 GAUGE_DEPTH = 0.014  #: depth below the top of the rails at which the gauge is measured [m]
 SPACING = 1e-4  #: spacing of the points that represent a curve [m]
-STEEPEST = 15.0  #: steepest slope up to which the side of a rail belongs to the head in the contact search
+STEEPEST = 15.0  #: largest slope at which the side of a rail belongs to the head in the contact search
 
 #: S1002, y from the running circle outward and F downward, in mm: bounds between sections H to A, then the sections
 S1002_BOUNDS = (-70.0, -62.764705882, -49.662510381, -39.764473993, -38.426669071, -35.0, -26.0, 32.15796, 60.0)

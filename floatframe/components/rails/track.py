@@ -110,7 +110,7 @@ class Track:
             if abs(one.cant[1] - other.cant[0]) > 1e-9:
                 raise ModelError(
                     f"track: cant jumps from {one.cant[1]:g} m to {other.cant[0]:g} m between segments {i} and "
-                    f"{i + 1}: rails cannot; put a transition between them"
+                    f"{i + 1}; put a transition between them"
                 )
 
     @property

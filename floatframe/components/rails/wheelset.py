@@ -30,7 +30,7 @@ __all__ = ["WheelOnRail", "Wheelset", "height_on_rails", "track_shape"]
 SIDES = {"left": 1, "right": -1}
 OFF_TRACK = (
     "a wheel has left the track: its flange has climbed the rail, or its tread is 25 mm above it; the outputs ..._off "
-    "say which one, and the results until here are kept"
+    "show which wheel; the results up to this time are kept"
 )
 PAIR_KEYS = ("radius", "running_circles", "gauge", "inclination")
 LAW_KEYS = (
@@ -138,7 +138,9 @@ def law_of_wheels(element: Wheelset | WheelOnRail, placed: Placed, wheels: tuple
     if placed.units.name != "m-kg-s":
         raise ModelError(f"{where}: wheels on rails are in m-kg-s, but the system in {placed.units.name!r}")
     if placed.on_ground[0]:
-        raise ModelError(f"{where}: marker: expected one on the body that turns, got the ground, where the rails are")
+        raise ModelError(
+            f"{where}: marker: expected one on the rotating body, got the ground, to which the rails belong"
+        )
     require_on_track(where, element, placed, wheels)
     names, units = output_names(wheels, WHEEL_OUTPUTS, CONTACT_OUTPUTS)
     held, turns = element.laws.normal == "constraint", element.spin_inertia > 0
@@ -234,7 +236,7 @@ def common_fields(name: str, table: Mapping[str, Any], read: Any, own: tuple[str
         if key not in known:
             raise ModelError(f"elements.{name}: unknown key {quoted(key)}; choose among {', '.join(known)}")
     if "marker" not in table:
-        raise ModelError(f"elements.{name}.marker: missing; expected the middle of the axle on the body that turns")
+        raise ModelError(f"elements.{name}.marker: missing; expected the middle of the axle on the rotating body")
     pair = Pair(
         profile_of_table(f"elements.{name}.wheel", "wheel", table.get("wheel", "s1002"), read),
         profile_of_table(f"elements.{name}.rail", "rail", table.get("rail", "60e1"), read),

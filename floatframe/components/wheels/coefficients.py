@@ -1,4 +1,4 @@
-"""The coefficients of the Magic Formula that are used, and the defaults of those missing in a file."""
+"""The coefficients of the Magic Formula, and their defaults for files that lack them."""
 
 __all__ = ["COEFFICIENTS", "LEFT_OUT", "NEEDED", "NEEDED_COMBINED", "ONLY_52", "ONLY_61", "SCALES"]
 
@@ -36,7 +36,7 @@ NEEDED_COMBINED = ("RBX1", "RCX1", "RBY1", "RCY1")  #: required in files for com
 
 #: neglected effects, by coefficient; they are reported if a file has the coefficient
 LEFT_OUT = {
-    "LMUV": "friction that falls with the sliding speed",
+    "LMUV": "friction that decreases with the sliding speed",
     "QFCX": "vertical deflection by longitudinal force",
     "QFCY": "vertical deflection by lateral force",
     "QFCX1": "vertical deflection by longitudinal force",

@@ -85,7 +85,7 @@ def contact(x, data):
     V_x, V_y, Omega, deflection_rate
         Velocities [m/s], spin relative to the road [rad/s].
     left
-        Length of the road that is left, ahead or behind [m].
+        Distance to the nearer end of the road [m].
     """
     R_0, at = data[RADIUS], int(data[ROAD])
     e = rotated_vector(x, 1, (data[AXIS], data[AXIS + 1], data[AXIS + 2]))
@@ -150,7 +150,7 @@ def moved(x, data):
     length = np.sqrt(e[0] * e[0] + e[1] * e[1])
     ahead = e[1] / length, -e[0] / length
     turn, lean = 0.0 * gone[0], 0.0 * gone[0]
-    for k in range(3):  # assembled axes (columns), and where they are now
+    for k in range(3):  # assembled axes (columns), and the present axes
         old = data[TURN_AT + k], data[TURN_AT + 3 + k], data[TURN_AT + 6 + k]
         new = turned_back(x, 0, (x[1, 3 + k], x[1, 6 + k], x[1, 9 + k]))
         half = cross(old, new)
@@ -161,7 +161,7 @@ def moved(x, data):
 
 @register_jitable(error_model="numpy")
 def touching(data, deflection):
-    """Return how far a wheel has landed, s² (3 - 2 s) with s = d / landing depth: 0 in the air, 1 beyond the depth.
+    """Return the landing factor s² (3 - 2 s) with s = d / landing depth: 0 in the air, 1 beyond the landing depth.
 
     Damping and tread forces are multiplied by it. They build up without a jump, so that a step in which a wheel lands
     has a solution.
@@ -176,7 +176,7 @@ def touching(data, deflection):
 
 @register_jitable(error_model="numpy")
 def normal_force(data, deflection, landed, rate, cosine, spring):
-    """Return F_z = (f(d) + c s d_dot) / cos gamma for d > 0, at least 0; s is how far the wheel has landed.
+    """Return F_z = (f(d) + c s d_dot) / cos gamma for d > 0, at least 0, with the landing factor s.
 
     The spring acts in the plane of the wheel. Divided by cos gamma, the normal force does the same work as the spring.
     """

@@ -21,13 +21,13 @@ def tyre_looks(
     Parameters
     ----------
     radius, width
-        Of the tyre [m]; None if the width is unknown.
+        Radius and width of the tyre [m]; None if the width is unknown.
     axis
         Spin axis in the axes of marker B, (3,).
     road
         The road, in the axes of marker A.
     is_in_metres
-        Whether radius and width are in metres, whatever the units of the system.
+        Whether radius and width are in metres for any units of the system.
     """
     wheel = Shape(Wheel(radius, width or WIDTH * radius, axis=axis))
     return (

@@ -106,8 +106,8 @@ def held(value, low, high):
 def relaxation(data, df, load, K_x, K_y, gamma):
     """Return the relaxation lengths along x and y [m].
 
-    They are computed from the coefficients p_T if the file has them, else as slip stiffness divided by the stiffness of
-    the carcass. A value given for the element overrides both.
+    They are computed from the coefficients p_T if the file has them, otherwise as slip stiffness divided by the
+    stiffness of the carcass. A value given for the element overrides both.
     """
     if data[SIGMA_FROM_FILE] == 0.0:
         return data[SIGMA_X] + 0.0 * load, data[SIGMA_Y] + 0.0 * load
@@ -257,8 +257,8 @@ class MagicFormulaTyre(Element):
         if self.tyre.cornering_stiffness * CONVENTIONS[self.convention] > 0:
             other = next(name for name in CONVENTIONS if name != self.convention)
             raise ModelError(
-                f"{where}: convention: {self.tyre.source} has PKY1 = {self.tyre.coefficients['PKY1']:g}, a side force "
-                f"along positive slip angles that {self.convention!r} forbids; is it a file of {other!r}?"
+                f"{where}: convention: {self.tyre.source} has PKY1 = {self.tyre.coefficients['PKY1']:g}, which means a "
+                f"side force along positive slip angles, contrary to {self.convention!r}; is it a file of {other!r}?"
             )
         if (self.relaxation_x is None) != (self.relaxation_y is None):
             raise ModelError(f"{where}: expected relaxation_x and relaxation_y, or neither (then the file's)")

@@ -35,7 +35,7 @@ def tyre_numbers(
     if abs(e[2]) > np.sqrt(1 - UPRIGHT**2):
         raise ModelError(
             f"{where}: its spin axis is {e.round(3).tolist()} in axes of marker_a, along the road's normal z, but the "
-            "axle of a wheel must lie across it: give `axis` (in axes of marker_b; default y), or rotate a marker"
+            "axle of a wheel must be normal to it: give `axis` (in axes of marker_b; default y), or rotate a marker"
         )
     ground = road.height(c[0], c[1])
     if c[2] <= ground:

@@ -31,7 +31,7 @@ class Read(Protocol):
         """Return a dataclass whose fields are the keys of a table."""
 
 
-#: function that makes the profile of each obstacle, and its arguments besides `length`
+#: function that returns the profile of each obstacle, and its arguments in addition to `length`
 OBSTACLES: dict[str, tuple[Callable[..., Polyline], tuple[str, ...]]] = {
     "step": (step, ("at", "height")),
     "ramp": (ramp, ("at", "height", "run")),
@@ -158,7 +158,7 @@ def properties_of_table(values: dict[str, Any], read: Read) -> TyreProperties:
     version = read.value(str, values.pop("version"), "version") if "version" in values else None
     if ("file" in values) == ("shipped" in values):
         raise ModelError(
-            f"{read.where}: expected file, a tyre property file, or shipped, the name of one of this package"
+            f"{read.where}: expected file = a tyre property file, or shipped = the name of a tyre in this package"
         )
     if "file" in values:
         return read_tyre_file(read.path(values.pop("file"), "file"), version=version)

@@ -6,11 +6,11 @@ relaxation length sigma, at the transport speed V = |V_x|:
     u_dot = -V_sx - (V/sigma_x + L) u        kappa'     = (u + tau u_dot) / sigma_x      steady: kappa = -V_sx/V
     v_dot =  V_sy - (V/sigma_y + L) v        tan alpha' = (v + tau v_dot) / sigma_y      steady: tan alpha = V_sy/V
 
-At a standstill V = 0, and the tread is a spring, which holds without creep. Two terms are added near a standstill; they
-vanish towards the low speed: a settling time tau, the damping of that spring, and a loss L, without which a tyre that
-slides at V = 0 would be stretched without limit. L begins at the slip at which the tyre slides, s = 1, and keeps s <=
-2: L = w(s - 1) s_dot / 2 with s = |(u/(sigma_x kappa_s), v/(sigma_y alpha_s))|, and s_dot the same expression with the
-slip velocity.
+At a standstill V = 0, and the tread is a spring, which holds without creep. Near a standstill two terms are added,
+which vanish towards the low speed: a settling time tau, which is the damping of this spring, and a loss L, without
+which the tread of a tyre that slides at V = 0 would stretch without limit. L begins at the slip at which the tyre
+slides, s = 1, and limits s to 2: L = w(s - 1) s_dot / 2 with s = |(u/(sigma_x kappa_s), v/(sigma_y alpha_s))|, and
+s_dot is the same expression with the slip velocity.
 """
 
 import numpy as np
@@ -66,7 +66,7 @@ def tread_slip(data, sigma, scale, z, z_dot, transport, V_sx, V_sy, landed):
     V_sx, V_sy
         Slip velocity relative to the road [m/s].
     landed
-        From 0 in the air to 1 on the road.
+        Landing factor, from 0 in the air to 1 on the road.
 
     Returns
     -------

@@ -58,8 +58,8 @@ def check_road(where: str, road: Any, radius: float) -> None:
     else:
         if abs(road.envelope_radius - radius) > FIT * radius:
             raise ModelError(
-                f"{where}: road: it is the envelope of a disc of radius {road.envelope_radius:g}, the wheel's is "
-                f"{radius:g}; make it with the wheel's radius"
+                f"{where}: road: it is the envelope of a disc of radius {road.envelope_radius:g}, but the radius of "
+                f"the wheel is {radius:g}; make the envelope for the radius of the wheel"
             )
 
 

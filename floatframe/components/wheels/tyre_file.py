@@ -86,13 +86,14 @@ def read_tyre_file(path: str | Path, *, version: str | None = None) -> TyrePrope
         raise ModelError(f"tyre file {path}: cannot be read: {error.strerror or error}") from None
     if b"\0" in content:
         raise ModelError(
-            f"tyre file {path}: it holds binary data; expected the text of a property file, [SECTION] and KEY = value"
+            f"tyre file {path}: it contains binary data; expected the text of a property file, [SECTION] and KEY = "
+            "value"
         )
     return tyre_from_text(content.decode("utf-8", errors="replace"), f"tyre file {path}", version=version)
 
 
 def shipped_tyre(name: str) -> Path:
-    """Return the property file of a shipped tyre, whose coefficients were made up for this project."""
+    """Return the property file of a shipped tyre, whose coefficients are fictitious."""
     found = {path.stem: path for path in sorted((Path(__file__).parent / "data").glob("*.tir"))}
     if name not in found:
         raise ModelError(f"tyre: expected one of {', '.join(found)}, which are shipped, got {name!r}")
@@ -251,7 +252,7 @@ def formula_version(words: dict[str, tuple[int, str]], where: str, version: str 
     said = f"FITTYP = {fit}" if fit else f"PROPERTY_FILE_FORMAT = {file_format or 'missing'}"
     raise ModelError(
         f"{where}: version of the formula: {said} is unknown (FITTYP {', '.join(FIT_TYPES)}; "
-        f'PROPERTY_FILE_FORMAT {", ".join(FORMATS)}); if it is 5.2 or 6.1, say version = "5.2" or "6.1"'
+        f'PROPERTY_FILE_FORMAT {", ".join(FORMATS)}); if it is 5.2 or 6.1, give version = "5.2" or "6.1"'
     )
 
 

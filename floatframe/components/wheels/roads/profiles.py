@@ -70,9 +70,9 @@ def iso_8608_road(
     Parameters
     ----------
     road_class
-        A to H.
-    Length of the road, which begins at x = 0 [m].
-        Of the road, from x = 0 [m].
+        Class, A to H.
+    length
+        Length of the road, which begins at x = 0 [m].
     seed
         Seed of the phases; the same seed gives the same road.
     tracks
@@ -103,7 +103,8 @@ def iso_8608_road(
         raise ModelError(f"road: band: expected 0 < lowest < highest n, got {low:g} and {high:g}")
     if 2 * spacing * high > 1:
         raise ModelError(
-            f"road: spacing: {spacing:g} m cannot carry waves of {high:g} cycles/m; choose at most {0.5 / high:.3g} m"
+            f"road: spacing: {spacing:g} m does not resolve waves of {high:g} cycles/m; choose at most "
+            f"{0.5 / high:.3g} m"
         )
     if coherence is not None and not 0 <= coherence <= 1:
         raise ModelError(f"road: coherence: expected a number from 0 to 1, got {coherence:g}")
@@ -179,5 +180,5 @@ def place(where: str, at: float, length: float) -> tuple[float, float]:
     """Return the checked start of an obstacle and the length of its road."""
     at, length = number(f"{where}: at", at, at_least=0.0), number(f"{where}: length", length, above=0.0)
     if at >= length:
-        raise ModelError(f"{where}: at: expected a place on the road of length {length:g}, got {at:g}")
+        raise ModelError(f"{where}: at: expected a position on the road of length {length:g}, got {at:g}")
     return at, length

@@ -175,7 +175,7 @@ class GridRoad:
         return float(road_height(self.numbers(), 0, float(x), float(y))[0])
 
     def enveloped(self, radius: float, *, width: float = 0.0, step: float | None = None) -> "GridRoad":
-        """Return the envelope for a rigid disc of that radius [m] and width [m]: R below its centre when it touches.
+        """Return the envelope for a rigid disc of radius R and a width [m]: points R below its centre when it touches.
 
         The ground is taken as linear between its knots. `step` is the spacing of the result [m], by default R/20.
         """
@@ -219,7 +219,7 @@ class Polyline:
         object.__setattr__(self, "x", x)
         object.__setattr__(self, "z", array_of_shape("profile: z", self.z, x.shape))
         if len(x) < 2 or np.any(np.diff(x) < 0) or x[0] == x[-1]:
-            raise ModelError(f"profile: x: expected two corners or more, none behind the one before, got {x.tolist()}")
+            raise ModelError(f"profile: x: expected at least two corners in the order of x, got {x.tolist()}")
 
     def road(self) -> GridRoad:
         """Return the profile itself as a road, for wheels that are small compared with it."""

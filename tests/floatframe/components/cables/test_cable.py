@@ -77,7 +77,7 @@ def test_points_that_coincide_and_too_much_preload_are_refused():
     mass = RigidBody("mass", 2.0, np.eye(3))
     for cable, words in (
         (Cable("c", [Marker(GROUND), Marker("mass")], 1.0), "coincide as placed"),
-        (Cable("c", [Marker(GROUND, position=(0, 0, 1)), Marker("mass")], 1.0, preload=2.0), "more than it is long"),
+        (Cable("c", [Marker(GROUND, position=(0, 0, 1)), Marker("mass")], 1.0, preload=2.0), "more than its length"),
     ):
         with pytest.raises(ModelError, match=words):
             integrate(System([mass], elements=[cable]), METHOD, 0.1, 1e-2)

@@ -203,7 +203,7 @@ def test_springs_between_nodes_come_along():
 
 
 def test_what_is_refused():
-    with pytest.raises(ModelError, match="not made of beams alone"):
+    with pytest.raises(ModelError, match="does not consist of beams alone"):
         exact_beams("bar", bar(nx=2))
     steel = fm.Material("steel", E=2.1e11, nu=0.3, rho=7850.0)
     with pytest.raises(ModelError, match="pieces from 1"):

@@ -105,7 +105,7 @@ def test_a_wheel_on_a_brake_stops_after_the_angle_of_its_energy():
         ({"static": 0.5}, "would never stick"),
         ({"stribeck_speed": None}, "stribeck_speed: missing"),
         ({"stiffness": 0.0}, "stiffness"),
-        ({"elastic": 1.0}, "elastic: expected a part below 1"),
+        ({"elastic": 1.0}, "elastic: expected a fraction below 1"),
         ({"motion": "round"}, "expected one of along, about"),
     ],
 )

@@ -47,7 +47,11 @@ SUPPLY, HOLE = Supply("pump", "line", 1e7), Orifice("hole", "line", "head", 1e-5
         ),
         ([jack(), HOLE, SUPPLY, Tank("other", "line")], {}, "'other': node 'line' has the pressure of another supply"),
         ([jack(), HOLE, SUPPLY], {"hed": Node(1e-5)}, "nodes: hed: no component names it"),
-        ([jack()], {}, "nothing sets its pressure: missing supply: give a supply or a tank, or the pressure of a node"),
+        (
+            [jack()],
+            {},
+            "nothing sets its pressure: missing supply: give a supply or a tank, or the initial pressure of a node",
+        ),
         ([HOLE, SUPPLY], {"head": Node(1e-5)}, "expected a cylinder or a pump, which attach it to bodies, got none"),
         ([jack(), jack()], {"head": Node(pressure=1e6)}, "components: the name 'jack' is used twice"),
         ([jack(), Accumulator("ball", "line", 1e-3, 1e6), SUPPLY], {}, "'ball': the pressure of node 'line' is given"),
@@ -73,7 +77,7 @@ def test_a_circuit_that_cannot_be_is_refused(parts, nodes, message):
     ("make", "message"),
     [
         (lambda: jack(head=None), "component 'jack': expected a node for head or rod or both, got none"),
-        (lambda: jack(head_dead_volume=0.0), "head_dead_volume: expected a number > 0, got 0: a chamber without any"),
+        (lambda: jack(head_dead_volume=0.0), "head_dead_volume: expected a number > 0, got 0: a chamber without"),
         (lambda: jack(rod="rod"), "rod_area: expected a number > 0 for the chamber 'rod', got 0"),
         (lambda: Orifice("hole", "a", "b", -1e-5), "component 'hole': area: expected a number > 0, got -1e-05"),
         (lambda: Supply("pump", "line", -1e5), "component 'pump': pressure: expected a number > 0, got -100000"),
@@ -99,7 +103,7 @@ def test_a_component_that_cannot_be_is_refused(make, message):
 
 def test_a_cylinder_that_is_placed_outside_its_stroke_is_refused():
     circuit = Circuit("circuit", OIL, [jack(), HOLE, SUPPLY], {})
-    for length, message in ((0.2, "0.2 apart as placed, stroke -0.1; expected 0 to 0.4"), (0.0, "are at one place")):
+    for length, message in ((0.2, "0.2 apart as placed, stroke -0.1; expected 0 to 0.4"), (0.0, "coincide as placed")):
         x = np.array([marker_motion([0, 0, 0]), marker_motion([0, 0, length])])
         with pytest.raises(ModelError, match=message):
             circuit.law(placed(x))

@@ -221,6 +221,6 @@ def test_other_bad_input_is_named():
     with pytest.raises(ModelError, match="millimetres"):
         equivalent_conicity(NEW, 3.0)
     y = np.linspace(-4e-3, 4e-3, 11)
-    with pytest.raises(ModelError, match="not steered back"):
+    with pytest.raises(ModelError, match="has no restoring effect"):
         equivalent_conicity(NEW, 3e-3, difference=(y, -0.1 * y))
     assert TableGrid().v[2] > 100

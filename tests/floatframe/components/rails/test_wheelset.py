@@ -244,7 +244,7 @@ def pushed_over():
 
 def test_a_wheel_off_the_track_ends_the_run_with_a_message_and_its_results():
     with pytest.raises(
-        ConvergenceError, match=r"'wheels'.*a wheel has left the track.*results until here are kept"
+        ConvergenceError, match=r"'wheels'.*a wheel has left the track.*results up to this time are kept"
     ) as caught:
         integrate(pushed_over(), METHOD, 2.0, 5e-4)
     motion = caught.value.trajectory

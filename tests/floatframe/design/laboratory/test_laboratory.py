@@ -405,7 +405,7 @@ def test_exact_beams_are_a_reference_for_bodies_of_lines(tmp_path):
 
 def test_exact_beams_of_a_solid_are_refused(folder):
     system, run = read_system(folder / "spin.toml")
-    with pytest.raises(ModelError, match="not made of beams alone"):
+    with pytest.raises(ModelError, match="does not consist of beams alone"):
         ff.design.laboratory.study(
             system, "blade", folder / "blade.toml", [ff.design.laboratory.Case(n_modes=1)],
             integrator=run.integrator, t_end=0.1, h=run.h,
