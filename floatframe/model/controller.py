@@ -1,4 +1,4 @@
-"""Sampled controllers: functions of measured values, called at a fixed period, whose outputs are held in between.
+"""Sampled controllers: functions of measured values, called at a fixed period, with constant outputs in between.
 
     pid = Controller("pid", period=1e-3, inputs=["hub.angle", "hub.angle.rate"], outputs=["motor"],
                      function=law, state=[0.0])
@@ -94,14 +94,14 @@ class Controller:
         model
             A discrete state space of python-control or scipy.signal: matrices A, B, C, D, and the period dt.
         inputs, outputs
-            As many as the model has, in its order.
+            Names of the inputs and outputs, in the order of the model.
         state
-            z at the start; None: zero.
+        Initial state z; None: zero.
 
         Raises
         ------
         ModelError
-            If the model is not discrete with a period, or its sizes do not fit.
+            If the model is not discrete with a period, or the numbers of inputs and outputs differ from it.
         """
         where = f"controller {name!r}"
         missing = [part for part in ("A", "B", "C", "D", "dt") if not hasattr(model, part)]
@@ -125,7 +125,7 @@ class Controller:
 
     @property
     def identity(self) -> tuple[Any, ...]:
-        """What tells it from other controllers, without its function."""
+        """The data that identify the controller, without its function."""
         start = None if self.state is None else self.state.tolist()
         return self.name, self.period, self.inputs, self.outputs, start
 

@@ -67,7 +67,7 @@ def rotated(R: Array, a: Array) -> Array:
 def rotation_matrix(p: Array) -> Array:
     """Return R_GB, (..., 3, 3), for Euler parameters p = (w, x, y, z), (..., 4): v_G = R_GB @ v_B."""
     p = np.asarray(p, dtype=float)
-    # numbers of Python for one rotation: four times as fast as arrays of one
+    # for a single rotation, Python numbers are four times as fast as arrays of length one
     w, x, y, z = p.tolist() if p.ndim == 1 else (p[..., k] for k in range(4))
     R = np.empty((*p.shape[:-1], 3, 3))
     R[..., 0, 0], R[..., 0, 1], R[..., 0, 2] = w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)
@@ -79,7 +79,7 @@ def rotation_matrix(p: Array) -> Array:
 def euler_parameters(R: Array) -> Array:
     """Return p, (..., 4), with w >= 0, for rotation matrices, (..., 3, 3).
 
-    From the row p_i p with the largest p_i of the products p_j p_k, so that no small number is divided by.
+    It is computed from the row p_i p of the products p_j p_k with the largest p_i, so that no divisor is small.
     """
     R = np.asarray(R, dtype=float)
     trace = np.trace(R, axis1=-2, axis2=-1)[..., None]

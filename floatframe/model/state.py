@@ -37,11 +37,11 @@ class State:
         Unknowns of the connections, (n_w,), such as those of an equilibrium; they include the states of elements and
         user forces; None: initial values.
     angle
-        Angles between bodies, counted through full turns, (n_angles,) [rad], such as those of a motion before; None, or
-        of another number: they begin between -pi and pi.
+        Angles between bodies, counted through full turns, (n_angles,) [rad], such as those of an earlier motion. None,
+        or another number of angles: they begin between -pi and pi.
     watched
-        Errors of steps and energy up to here, as the watch of a run has found them; a run that continues from here in
-        time is judged with that run as one motion; None: unknown.
+        Errors of steps and energy up to this state, from the watch of a run. A run that continues from this state in
+        time is assessed together with that run as one motion. None: unknown.
     """
 
     r: Array

@@ -27,7 +27,7 @@ T = TypeVar("T")
 
 
 # default units --------------------------------------------------------------------------------------------------------
-# Conversion of the default values of joints, forces and elements to the units of a system; user values stay.
+# Conversion of the default values of joints, forces and elements to the units of a system; user values are kept.
 
 
 def in_units_of(units: Units, part: Any) -> Any:
@@ -82,9 +82,9 @@ class System:
     Parameters
     ----------
     bodies
-        Bodies of the system; the ground is none of them.
+        Bodies of the system, without the ground.
     joints
-        Couplers among them are moved to `couplers`.
+        Joints; couplers among them are moved to `couplers`.
     forces
         Forces, springs and loads.
     units
@@ -98,7 +98,7 @@ class System:
     elements
         Public elements, see `floatframe.model.elements`.
     sensors
-        Quantities measured on its motions.
+        Quantities measured on motions of the system.
     inputs
         Forces that act as inputs when the system is linearised.
     outputs
@@ -106,7 +106,7 @@ class System:
     events
         Actions of a run when a value passes a level.
     fmus
-        Units of other programs, see `co_simulate`.
+        FMUs of other programs, see `co_simulate`.
     controllers
         Sampled controllers (`Controller`), which act in runs; other analyses see the system without them.
     scene
@@ -224,5 +224,5 @@ def require_names(where: str, names: Iterable[str], *, taken: Iterable[str] = ()
         if not isinstance(name, str) or not name.strip() or "/" in name or name in (".", ".."):
             raise ModelError(f"{where}: expected a name without '/', got {name!r}")
         if name in seen:
-            raise ModelError(f"{where}: the name {name!r} is used twice, or reserved; give each its own")
+            raise ModelError(f"{where}: the name {name!r} is used twice or reserved; choose another")
         seen.add(name)

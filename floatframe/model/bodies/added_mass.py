@@ -1,10 +1,10 @@
 """Small masses fixed to interfaces of a reduced body, whose mass and inertia become part of the body.
 
 An added mass moves and rotates with its interface. A particle at rho from the interface node has the position c = p +
-rho and the shape phi = Psi_t + Psi_r × rho, so that every inertia moment of the body grows by sums over particles
+rho and the shape phi = Psi_t + Psi_r × rho, so that every inertia moment of the body increases by a sum over particles
 (theory.md §5). An inertia tensor is represented by six particles on its principal axes. Compared with a rigid body
-fixed to the interface, only terms of second order in the elastic rotation are neglected; for a mass at the interface
-node, none are.
+fixed to the interface, only terms of second order in the elastic rotation are neglected, and no terms if the mass is at
+the interface node.
 
 rod = with_masses(rod, [AddedMass("small_end", 0.3), AddedMass("big_end", 0.5, offset=(0, 0, 0.02), inertia=J)])
 """
@@ -143,9 +143,9 @@ def with_particle(geometric: GeometricStiffness, k: int, m: float, c: Array, rho
     """
     if not geometric.is_loaded[k]:
         raise ModelError(
-            f"added mass at interface {k}, whose loads were left out of the geometric stiffness: its inertia would not "
-            "stiffen the body; reduce the body with this interface among geometric_stiffness = [...], or leave the "
-            "geometric stiffness out (replace(body, geometric=None))"
+            f"added mass at interface {k}, whose loads are not in the geometric stiffness: its inertia would not "
+            "stiffen the body; reduce the body with this interface among geometric_stiffness = [...], or remove the "
+            "geometric stiffness (replace(body, geometric=None))"
         )
     K = geometric.of_interface(k)
 

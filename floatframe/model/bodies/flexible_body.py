@@ -27,8 +27,8 @@ __all__ = ["FlexibleBody"]
 class FlexibleBody:
     """An instance of a reduced body; several instances can share its data.
 
-    Position and motion are those of the *mesh* axes. A body therefore stands where its mesh was drawn unless it is
-    moved, and the input does not change if the same part is reduced in another body frame (nodal or Tisserand).
+    Position and motion are those of the *mesh* axes. By default a body is therefore where its mesh was drawn, and the
+    input does not depend on the frame in which the part was reduced (nodal or Tisserand).
 
     Parameters
     ----------
@@ -57,13 +57,14 @@ class FlexibleBody:
         Whether to neglect inertia terms that the reduced body lacks (`Moments.missing`); the motion is then exact to
         first order in speeds and deformation. False: a body without them is refused.
     shapes
-        Shapes drawn besides its surface, in mesh axes or in those of interfaces.
+        Shapes drawn in addition to its surface, in mesh axes or in axes of interfaces.
 
     Notes
     -----
-    A body without a position goes from the ground origin to the nearest pose that its joints ask for: their points
-    coincide; a body without an orientation too takes the smallest rotation that fulfils the `axis_b` or `rotation` of a
-    joint. What the joints leave free stays as drawn. A joint with one marker lies where this marker is.
+    A body without a position moves from the ground origin to the nearest pose in which the points of its joints
+    coincide. A body that has no orientation either takes the smallest rotation that satisfies the `axis_b` or
+    `rotation` of a joint. Motions that the joints leave free do not change its pose. A joint with one marker is at this
+    marker.
 
     Raises
     ------
@@ -108,7 +109,7 @@ class FlexibleBody:
             raise ModelError(f"{where}: stiffening: expected true, false or 'auto', got {self.stiffening!r}")
         if self.stiffening is True and self.reduced.geometric is None:
             raise ModelError(
-                f"{where}: stiffening is asked for, but the reduced body {self.reduced.name!r} holds no geometric "
+                f"{where}: stiffening is requested, but the reduced body {self.reduced.name!r} contains no geometric "
                 "stiffness; reduce it again with geometric stiffness from a body with an element model, or omit "
                 "stiffening"
             )
@@ -118,7 +119,7 @@ class FlexibleBody:
         if missing and self.reduced.n_q and not self.leave_out_missing:
             raise ModelError(
                 f"{where}: a motion needs the inertia terms {', '.join(missing)}, which the reduced body "
-                f"{self.reduced.name!r} does not hold: the program that reduced it did not write them. "
+                f"{self.reduced.name!r} does not contain, because the program that reduced it did not write them. "
                 "Import it again with its full mass matrix, its nodal masses, or its mesh and density (cms import); or "
                 f"give leave_out_missing = true: {self.reduced.moments.trust}"
             )

@@ -44,13 +44,13 @@ class Marker:
     triad
         Axes of the marker as columns, in those of the body or interface, (3, 3); None: the same axes.
     node
-        Number of a kept node; "INSTANCE.number" where instances have the same numbers.
+        Number of a kept node; "INSTANCE.number" if instances have the same numbers.
     element
         Number of an element on the surface.
     set
         Name of a set of nodes or elements.
     tolerance
-        How far a node may be from a position, of the size of the body.
+        Largest distance of a node from a position, relative to the size of the body.
     """
 
     body: str | Named

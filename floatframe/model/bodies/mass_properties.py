@@ -48,9 +48,9 @@ def mass_properties(
     mass
         Mass [kg].
     center_of_mass
-        In the body frame, (3,) [m].
+        Centre of mass in the body frame, (3,) [m].
     inertia
-        Tensor about the reference point, (3, 3) [kg m²].
+        Inertia tensor about the reference point, (3, 3) [kg m²].
     axes
         Axes in which the tensor is given, as columns, in the body frame, (3, 3), such as principal axes. Default: those
         of the body frame.

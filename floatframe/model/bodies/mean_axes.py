@@ -1,13 +1,13 @@
 """A stiffened body in mean axes, and the transformation to the frame of its file (docs/theory.md §7).
 
-The engine computes the motion of a stiffened body in its mean axes B', whatever frame B its file has. The strain of a
+The engine computes the motion of a stiffened body in its mean axes B' for any frame B of its file. The strain of a
 body does not depend on the frame, so the modal coordinates of both frames are related by a constant matrix, q = Z q'.
 In addition, the rotation vector of B in B' and the position of one point c_p of B are needed, both to second order:
 
     R = R' exp(theta),  r + R c_p = r' + R' rho,  (rho, theta) = (rho_0, 0) + Psi q' - 1/2 q'ᵀ K q'
 
 These are the kinematics of a marker (`floatframe.model.bodies.marker_shape`). Its Psi and K follow from the definition
-of mean axes, described in B (c̄ = c - S/m, Theta = -theta the rotation vector of B' in B):
+of mean axes, written in B (with c̄ = c - S/m and the rotation vector Theta = -theta of B' in B):
 
 (1) the origin of B' is the centre of mass:        m r' = m r + R s(q),  s = S + 1C q + 1/2 qᵀ K_t q
 (2) the deformation does not rotate B':            ax(exp(-Theta) A(q)) = 0,  A = ∫ (c + u) c̄ᵀ
@@ -15,8 +15,8 @@ of mean axes, described in B (c̄ = c - S/m, Theta = -theta the rotation vector 
 (4) second order:                                  (tr R̄ 1 - R̄) Theta_2 = ax(U_2 - Theta_1~ U_1 + 1/2 Theta_1~² R̄)
     ax(U_2) = 1/2 qᵀ (K_r - S/m × K_t) q: the work of the unit loads of rotation and translation
 
-ax(U) = Σ o × f of U = Σ f oᵀ. The two transformations are inverse to each other within rounding. c_p is the interface
-to which a nodal frame is attached; its marker then does not move in B, as the engine requires.
+Here ax(U) = Σ o × f for U = Σ f oᵀ. The two transformations are inverse to each other within rounding. c_p is the
+interface to which a nodal frame is attached; its marker then does not move in B, as the engine requires.
 """
 
 from dataclasses import dataclass
@@ -158,7 +158,7 @@ def made_mean_axes(reduced: ReducedBody) -> MeanAxes:
     mean, change = converted(reduced, TisserandFrame(axes=(x, y, z)))
     at = reduced.frame.at
     point = np.array(reduced.interface(at).position) if at else np.zeros(3)
-    turn = tuple(-form for form in turn_of_mean_axes(reduced))  # of B in B', which is the inverse rotation
+    turn = tuple(-form for form in turn_of_mean_axes(reduced))  # rotation vector of B in B', the inverse rotation
     rho = place_of_point(reduced, point, *turn)
     Psi, second = (np.concatenate(parts) for parts in zip(rho, turn, strict=True))
     Z = change.Z
@@ -168,7 +168,10 @@ def made_mean_axes(reduced: ReducedBody) -> MeanAxes:
 
 
 def turn_of_mean_axes(reduced: ReducedBody) -> tuple[Array, Array]:
-    """Return the rotation vector of the mean axes in B, A q + 1/2 qᵀ B q, as A, (3, n_q), and B, (3, n_q, n_q)."""
+    """Return the rotation vector of the mean axes relative to the body frame, theta = A q + ½ qᵀ C q.
+
+    The coefficients are A, (3, n_q), and C, (3, n_q, n_q).
+    """
     moments, geometric = reduced.moments, reduced.geometric
     assert geometric is not None
     c_0 = moments.center_of_mass

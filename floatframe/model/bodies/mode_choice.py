@@ -16,8 +16,8 @@ __all__ = ["frozen_to_rigid", "with_modes", "without_modes"]
 def with_modes(body: ReducedBody, modes: Sequence[int]) -> ReducedBody:
     """Return the body with only the modes of these numbers (from zero), in this order.
 
-    Mass, inertia, interfaces and nodes stay. Stress points, the columns of the mode set and the data for another body
-    frame are left out. Results then have fewer modes than the file, so films of them need this body.
+    Mass, inertia, interfaces and nodes are kept. Stress points, the columns of the mode set and the data for another
+    body frame are removed. Results have fewer modes than the file, so that films of them need this body.
 
     Raises
     ------

@@ -29,13 +29,13 @@ class RigidBody:
     Parameters
     ----------
     name
-        Unique in the system; markers name the body by it.
+        Name of the body, unique in the system; markers name the body by it.
     mass
         Mass [kg].
     inertia
         Inertia tensor about the centre of mass, not about the frame origin, in body axes, (3, 3) [kg m²].
     center_of_mass
-        From the frame origin, in body axes, (3,) [m]; by default the origin itself.
+        Centre of mass relative to the frame origin, in body axes, (3,) [m]; default: the origin.
     position
         Initial position of the frame origin, in ground axes, (3,) [m]; None: the joints place the body (below).
     orientation
@@ -49,9 +49,10 @@ class RigidBody:
 
     Notes
     -----
-    A body without a position goes from the ground origin to the nearest pose that its joints ask for: their points
-    coincide; a body without an orientation too takes the smallest rotation that fulfils the `axis_b` or `rotation` of a
-    joint. What the joints leave free stays as drawn. A joint with one marker lies where this marker is.
+    A body without a position moves from the ground origin to the nearest pose in which the points of its joints
+    coincide. A body that has no orientation either takes the smallest rotation that satisfies the `axis_b` or
+    `rotation` of a joint. Motions that the joints leave free do not change its pose. A joint with one marker is at this
+    marker.
 
     Raises
     ------

@@ -89,9 +89,9 @@ def grid_numbers(where: str, x: Sequence[float], y: Sequence[float], values: Seq
     Parameters
     ----------
     x, y
-        Increasing, two or more of each.
-    values
-        One row for each x, one column for each y, (n_x, n_y).
+        Increasing coordinates, two or more of each.
+            values
+    Values, with one row for each x and one column for each y, (n_x, n_y).
     """
     axes = []
     for name, given in (("x", x), ("y", y)):

@@ -90,11 +90,11 @@ class ElementLaw:
     multiplier_units
         Unit of each multiplier.
     multiplier_sizes
-        Typical magnitudes of multipliers that hold nothing, as `state_sizes`.
+        Typical magnitudes of multipliers that constrain nothing, as for `state_sizes`.
     holds
-        What each multiplier holds: POSITION, VELOCITY or NOTHING.
+        The quantity that each multiplier constrains: POSITION, VELOCITY or NOTHING.
     held_units
-        Units of g; default "m", or "m/s" for a velocity; "rad" and "1" are measured as angles.
+        Units of g; default "m", or "m/s" for a velocity; "rad" and "1" are treated as angles.
     outputs
         Names of quantities that sensors and reports can read.
     output_units
@@ -281,7 +281,7 @@ class Element:
         By default none: any size is allowed.
 
         The function takes the axes of the markers in ground axes, (n_t, n, 3, 3), and returns the relative difference
-        between an angle and what the law takes for it, (n_t,).
+        between an angle and its approximation in the law, (n_t,).
         """
         return None
 

@@ -2,8 +2,8 @@
 
 Quantities of each marker except the first, in the axes of the first; for a marker b:
 
-    b_x, b_y, b_z       its position relative to it     b_vx, b_vy, b_vz    its velocity relative to it
-    b_rx, b_ry, b_rz    its rotation vector             b_wx, b_wy, b_wz    its angular velocity relative to it
+    b_x, b_y, b_z       relative position               b_vx, b_vy, b_vz    relative velocity
+    b_rx, b_ry, b_rz    relative rotation vector        b_wx, b_wy, b_wz    relative angular velocity
 
 Further names in expressions are the time t, states, parameters, functions of one variable, and terms (named expressions
 of all these and of earlier terms). Forces b_Fx, b_Fy, b_Fz act at b and moments b_Mx, b_My, b_Mz on it. The opposite
@@ -298,7 +298,7 @@ class ExpressionElement(Element):
                 raise ModelError(f"{where}: forces: no component {quoted(key)}{nearest(key, given)}")
         if set(self.rates) != set(self.states):
             raise ModelError(
-                f"{where}: expected a rate and a value at the start for each state, got rates of "
+                f"{where}: expected a rate and an initial value for each state, got rates of "
                 f"{sorted(self.rates)} and states {sorted(self.states)}"
             )
         for part in ("states", "parameters"):

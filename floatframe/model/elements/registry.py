@@ -46,7 +46,7 @@ def element_class(name: str, folder: Path | None = None) -> type[Element]:
     name
         "PACKAGE.ELEMENT"; the package is one of floatframe, or one on the Python path.
     folder
-        Folder of the system file, in which modules are sought last.
+        Folder of the system file, in which modules are searched for last.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 """An element that an event has switched off; its rows remain, but it has no effect.
 
-Its wrenches and state rates are zero, unless its law defines by `off` what it does then (a closed valve, a dragging
+Its wrenches and state rates are zero, unless its law has a function `off` for this case (a closed valve, a dragging
 clutch). Its constraints are released, and its multipliers are zero.
 """
 

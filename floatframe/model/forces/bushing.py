@@ -34,9 +34,9 @@ class Bushing:
     zero where the markers coincide. A rotation about one axis is counted beyond half a turn and through full turns. If
     B also tilts, the rotation vector has little meaning near a full turn.
 
-    With axes half way between A and B, both markers play the same part, as in a beam or a rubber sleeve between two
-    bodies with similar rotation. The rotation must then stay below half a turn. Between the ground and a spinning body,
-    these axes rotate at half the speed.
+    With axes half way between A and B, the law is symmetric in both markers, as for a beam or a rubber sleeve between
+    two bodies with similar rotation. The rotation must then stay below half a turn. Between the ground and a spinning
+    body, these axes rotate at half the speed.
 
     A body given instead of a marker is attached at the position of the other marker, with zero deformation as
     assembled.
@@ -83,7 +83,9 @@ class Bushing:
             )
         low = float(np.linalg.eigvalsh(0.5 * (self.damping + self.damping.T))[0])
         if low < -1e-9 * max(np.abs(self.damping).max(), 1e-300):
-            raise ModelError(f"{where}: damping: expected no negative eigenvalue, got {low:.3g}; it would give energy")
+            raise ModelError(
+                f"{where}: damping: expected no negative eigenvalue, got {low:.3g}; the bushing would generate energy"
+            )
         for name, function in self.characteristics.items():
             if name not in DEFORMATIONS:
                 raise ModelError(

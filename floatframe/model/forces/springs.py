@@ -25,7 +25,7 @@ __all__ = ["JointForce", "SpringDamper"]
 class SpringDamper:
     """Tension k (l - l_0) + c l_dot + preload + characteristic(l - l_0) along the line from marker A to marker B.
 
-    l is the length of that line. A spring has no direction where its markers coincide. If that can happen, set
+    l is the length of that line. A spring has no direction while its markers coincide. If that can happen, set
     free_length = 0 and no preload, or keep the markers apart.
 
     Parameters

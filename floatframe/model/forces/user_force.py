@@ -45,7 +45,7 @@ class UserForce:
     coordinates
         Observed coordinates, along which forces may act, by name; "hub.angle" is that of a joint.
     forces
-        Expressions by coordinate, or names.
+        Expressions by coordinate; with `function`, the names of the coordinates.
     rates
         Expressions of the rates of the states.
     states
@@ -55,7 +55,7 @@ class UserForce:
     functions
         Functions of one variable in expressions.
     function
-        Instead of expressions.
+        Function for forces and rates, in place of expressions.
     knots
         Times at which the function jumps; steps of a run end there [s].
     switches
@@ -80,7 +80,7 @@ class UserForce:
     def __post_init__(self) -> None:
         where = f"force {self.name!r}"
         if not isinstance(self.coordinates, Mapping) or not self.coordinates:
-            raise ModelError(f"{where}: coordinates: expected a dict with one coordinate at least, by name")
+            raise ModelError(f"{where}: coordinates: expected a dict with at least one coordinate by name")
         coordinates = {k: coordinate_of(f"{where}: coordinates: {k}", each) for k, each in self.coordinates.items()}
         object.__setattr__(self, "coordinates", coordinates)
         require_words(where, self.inputs)
@@ -118,7 +118,7 @@ class UserForce:
             raise ModelError(f"{where}: forces: expected expressions by coordinate, or a function, got {self.forces!r}")
         if set(self.rates) != set(self.states):
             raise ModelError(
-                f"{where}: expected a rate and a value at the start for each state, got rates of "
+                f"{where}: expected a rate and an initial value for each state, got rates of "
                 f"{sorted(self.rates)} and states {sorted(self.states)}"
             )
         if not self.forces and not self.rates:
@@ -151,4 +151,4 @@ def require_words(where: str, names: Sequence[str]) -> None:
         if not isinstance(name, str) or not name.isidentifier():
             raise ModelError(f"{where}: expected a name of letters, digits and _, got {name!r}")
         if name in names[:k] or name in CONSTANTS or name in FUNCTIONS:
-            raise ModelError(f"{where}: the name {name!r} is used twice, or that of a function; choose another")
+            raise ModelError(f"{where}: the name {name!r} is used twice, or is the name of a function; choose another")

@@ -148,7 +148,9 @@ class Writer:
             yes, no = self.write(node.body), self.write(node.orelse)
             self.compare(node.test)
             return self.tape.add(SELECT, yes, no)
-        raise self.refuse(node, f"{quoted(ast.unparse(node))} is no part of the language (see docs/system_file.md)")
+        raise self.refuse(
+            node, f"{quoted(ast.unparse(node))} does not belong to the language (see docs/system_file.md)"
+        )
 
     def number(self, node: ast.Constant) -> int:
         """Write a number."""
@@ -180,7 +182,7 @@ class Writer:
     def call(self, node: ast.Call) -> int:
         """Write a call of a function."""
         if not isinstance(node.func, ast.Name) or node.keywords:
-            raise self.refuse(node, f"{quoted(ast.unparse(node))} is no part of the language")
+            raise self.refuse(node, f"{quoted(ast.unparse(node))} does not belong to the language")
         name, n = node.func.id, len(node.args)
         if name in self.functions:
             if n != 1:

@@ -1,9 +1,9 @@
 """Spline motions of several coordinates through given values, as fast as limits of speed and acceleration allow.
 
-A spline through the same values in s times the time has 1/s of the speed and 1/s² of the acceleration everywhere. If
-only the values are given, the smallest s for which no coordinate exceeds a limit follows directly, and some coordinate
-reaches a limit somewhere. The distribution of time between the values is a choice. Here each part takes the time that
-the slowest coordinate needs at its largest speed, or from rest to rest by its acceleration, whichever is longer.
+If all times of a spline are multiplied by s, its speed is multiplied by 1/s and its acceleration by 1/s² everywhere.
+The smallest s for which no coordinate exceeds a limit follows directly, and some coordinate then reaches a limit. The
+distribution of time between the values is a choice: here each part takes the time that the slowest coordinate needs at
+its largest speed, or from rest to rest with its largest acceleration, whichever is longer.
 """
 
 from collections.abc import Mapping, Sequence
@@ -125,7 +125,7 @@ def path_motion(
     lengths = np.max([np.maximum(ways[name] / v[name], np.sqrt(4 * ways[name] / a[name])) for name in points], axis=0)
     if not lengths.all():
         k = int(np.flatnonzero(lengths == 0)[0])
-        raise ModelError(f"{where}: no coordinate moves between values {k} and {k + 1}; leave one of them out")
+        raise ModelError(f"{where}: no coordinate moves between values {k} and {k + 1}; remove one of them")
     t = np.concatenate([[0.0], np.cumsum(lengths)])
     splines = {name: rest_to_rest_spline(t, each, degree) for name, each in points.items()}
     s = max(
@@ -140,6 +140,8 @@ def limit_of(where: str, what: str, name: str, given: float | Mapping[str, float
     """Return the positive limit of one coordinate; raise `ModelError` if it has none."""
     if isinstance(given, Mapping):
         if name not in given:
-            raise ModelError(f"{where}: {what}: there is none of {name!r}; got {', '.join(map(repr, given)) or 'none'}")
+            raise ModelError(
+                f"{where}: {what}: expected a limit of {name!r}, got {', '.join(map(repr, given)) or 'none'}"
+            )
         given = given[name]
     return number(f"{where}: {what} of {name!r}", given, above=0.0)

@@ -116,8 +116,8 @@ def trapezoid(
     T = shortest if duration is None else number(f"{where}: duration", duration, above=0.0)
     if shortest * (1 - LEAST_EXCESS) > T:
         raise ModelError(
-            f"{where}: {x0:g} to {x1:g} takes {shortest:.6g} at least with speed {v:g}, acceleration {a:g} and "
-            f"deceleration {d:g}; the duration is {T:g}: give more time, or higher limits"
+            f"{where}: {x0:g} to {x1:g} takes at least {shortest:.6g} with speed {v:g}, acceleration {a:g} and "
+            f"deceleration {d:g}, but the duration is {T:g}; give more time, or higher limits"
         )
     inverse = 1 / a + 1 / d
     # h = v T - v²/2 (1/a + 1/d)

@@ -1,8 +1,8 @@
 """Functions of time from tables of positions, or of accelerations that are integrated twice exactly.
 
-A cubic spline through samples of a position oscillates about the original acceleration: it overshoots at every jump of
-its slope. A quantity known as an acceleration should therefore remain one. `acceleration_table` interpolates it
-linearly between its samples; the second integral is a cubic on every piece, exact to rounding.
+The acceleration of a cubic spline through samples of a position oscillates, and overshoots at every jump of the
+original acceleration's slope. Measured accelerations should therefore be given as accelerations. `acceleration_table`
+interpolates them linearly between the samples; the second integral is a cubic on every piece, exact to rounding.
 """
 
 from collections.abc import Callable

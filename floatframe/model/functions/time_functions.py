@@ -238,6 +238,6 @@ def sampled(function: Callable[[float], float], t_start: float, t_end: float, to
             return spline
         n *= 2
     raise ModelError(
-        f"sampled: the function is met within {error:.3g} only, not {tolerance:.3g}, by {MOST_PIECES} pieces; it jumps "
-        "or has a kink: give pieces between them, or a larger tolerance"
+        f"sampled: {MOST_PIECES} pieces approximate the function within {error:.3g}, expected {tolerance:.3g}; it "
+        "jumps or has a kink: give pieces between jumps and kinks, or a larger tolerance"
     )

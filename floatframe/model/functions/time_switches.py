@@ -2,8 +2,8 @@
 
 `10 if t < 0.3 else 0` jumps at 0.3, `f(2*t - 1)` where 2 t - 1 passes a jump of f, `sign(sin(50*t))` at every zero of
 the sine, `min(5, tan(t))` at every pole of the tangent, `atan2(sin(t), cos(t))` once a turn. Each is a switch: a
-function of time that is true or false. Its changes are bracketed between given times and found by bisection. A step
-that is cut where nothing jumps (atan2, where its second argument passes zero below the first axis) loses nothing. A
+function of time that is true or false. Its changes are bracketed between given times and found by bisection. A step may
+also end where nothing jumps (atan2, if its second argument passes zero below the first axis), which does no harm. A
 denominator that touches zero without passing it, as in `x/abs(x)`, is not found: write `sign(x)`. A comparison of
 coordinates depends on the motion, and is not handled here.
 """

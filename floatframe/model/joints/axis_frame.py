@@ -66,6 +66,6 @@ def checked_motions(joint: Any) -> None:
             if len(times):
                 raise ModelError(
                     f"{where}: {name}: the {what} jumps by {sizes[0]:.6g} at t = {times[0]:.6g}, which no body can "
-                    "follow; let its pieces meet"
+                    "follow; make its pieces continuous"
                 )
     object.__setattr__(joint, "motions", motions)

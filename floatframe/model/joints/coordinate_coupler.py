@@ -94,12 +94,12 @@ class CoordinateCoupler:
         except (TypeError, ValueError):
             raise ModelError(f"{where}: terms: expected pairs (coordinate, coefficient), got {self.terms!r}") from None
         if not terms:
-            raise ModelError(f"{where}: terms: expected one coordinate at least, got none")
+            raise ModelError(f"{where}: terms: expected at least one coordinate, got none")
         checked = []
         for k, (coordinate, factor) in enumerate(terms):
             value = number(f"{where}: coefficient {k + 1}", factor)
             if value == 0:
-                raise ModelError(f"{where}: coefficient {k + 1}: expected a number other than zero; leave the term out")
+                raise ModelError(f"{where}: coefficient {k + 1}: expected a number other than zero; remove the term")
             checked.append((coordinate_of(f"{where}: term {k + 1}", coordinate), value))
         object.__setattr__(self, "terms", tuple(checked))
         if self.limits is not None:

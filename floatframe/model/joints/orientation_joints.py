@@ -165,7 +165,7 @@ class UniversalJoint(Joint):
         z = A_a.T @ A_b @ self.axis_b
         z = z - (z @ self.axis) * self.axis
         if np.linalg.norm(z) < 1e-3:
-            raise ModelError(f"joint {self.name!r}: expected axes at about a right angle as placed, got parallel ones")
+            raise ModelError(f"joint {self.name!r}: expected axes at about a right angle as placed, got parallel axes")
         z = z / np.linalg.norm(z)
         frame = (np.cross(z, self.axis), z, self.axis_b)
         z_b = A_b.T @ A_a @ self.axis

@@ -127,7 +127,7 @@ class DistanceJoint(Joint):
     marker_a, marker_b
         The two markers; a body, or its name, is attached where the other marker is.
     distance
-        [m]; None: as assembled.
+        Constrained distance [m]; None: as assembled.
     motions
         Prescribed motions by coordinate; a number fixes the coordinate.
     """

@@ -28,18 +28,18 @@ METRE = Quantity(1.0, LENGTH)
 class RollingDisc(Joint):
     """A thin disc about the point of marker B rolls without slip on a plane through the point of marker A.
 
-    It has one position constraint, the contact, and two velocity constraints: the rim does not slide at the contact. It
-    does not lift off, so check the sign of the reaction. Constrained velocities do not drift, but the path that results
-    from them is only found by the integrator.
+    It has one position constraint, the contact, and two velocity constraints: the rim does not slide at the contact.
+    The disc cannot lift off, so check the sign of the reaction. Constrained velocities do not drift, but the resulting
+    path has the errors of the integrator.
 
     Parameters
     ----------
     name
         Name of the joint, unique in the system.
     marker_a
-        a Marker: a point of the plane.
+        Marker at a point of the plane.
     marker_b
-        a Marker: the centre of the disc.
+        Marker at the centre of the disc.
     radius
         Radius of the disc [m].
     axis
@@ -62,7 +62,8 @@ class RollingDisc(Joint):
         object.__setattr__(self, "radius", number(f"joint {self.name!r}: radius", self.radius, above=0.0))
         for key, what in (("marker_a", "a point of the plane"), ("marker_b", "the centre of the disc")):
             given = getattr(self, key)
-            # a body without marker would be met at the position of the other marker: the centre would lie on the plane
+            # a body without marker is attached at the other marker, so that the centre of the disc would be on the
+            # plane
             if not isinstance(given, Marker):
                 raise ModelError(
                     f"joint {self.name!r}: {key}: expected a Marker, {what}, such as Marker({body_name(given)!r}, "

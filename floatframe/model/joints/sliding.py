@@ -118,7 +118,7 @@ def line_triad(where: str, points: Array, normal: Array | None) -> tuple[Array, 
     chord = points[-1] - points[0]
     length = float(np.linalg.norm(chord))
     if not length > 0:
-        raise ModelError(f"{where}: the first and the last interface of the line are in one place")
+        raise ModelError(f"{where}: the first and the last interface of the line coincide")
     x = chord / length
     s = (points - points[0]) @ x
     beside = float(np.abs(points - points[0] - np.outer(s, x)).max())
@@ -130,6 +130,6 @@ def line_triad(where: str, points: Array, normal: Array | None) -> tuple[Array, 
     y = np.eye(3)[int(np.argmin(np.abs(x)))] if normal is None else normal
     y = y - (y @ x) * x
     if np.linalg.norm(y) < 1e-6:
-        raise ModelError(f"{where}: normal: expected a direction across the line {x.round(6)}, got one along it")
+        raise ModelError(f"{where}: normal: expected a direction normal to the line {x.round(6)}, got one along it")
     y = y / np.linalg.norm(y)
     return s, np.column_stack([x, y, np.cross(x, y)])

@@ -62,5 +62,5 @@ def mesh_file(path: str | os.PathLike[str], *, scale: float = 1.0) -> Mesh:
         raise ModelError(f"mesh: {path}: cannot be read as a surface: {error}") from error
     triangles = surface.faces.reshape(-1, 4)[:, 1:] if surface.n_cells else np.zeros((0, 3), np.int64)
     if not len(triangles):
-        raise ModelError(f"mesh: {path}: holds no faces")
+        raise ModelError(f"mesh: {path}: contains no faces")
     return Mesh(scale * np.asarray(surface.points, dtype=float), triangles)

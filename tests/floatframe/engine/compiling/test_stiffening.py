@@ -369,7 +369,7 @@ def test_without_stiffening_the_motion_is_that_of_the_body_without_matrices():
 
 def test_stiffening_of_a_body_without_matrices_is_refused():
     body = reduced_body(random_point_masses(2, 3), stiffness(2))
-    with pytest.raises(ModelError, match="holds no geometric stiffness; reduce it again"):
+    with pytest.raises(ModelError, match="contains no geometric stiffness; reduce it again"):
         FlexibleBody("body", body, stiffening=True)
     with pytest.raises(ModelError, match="expected true, false or 'auto', got 'yes'"):
         FlexibleBody("body", body, stiffening="yes")
@@ -391,7 +391,7 @@ def test_stiffening_in_a_system_file(tmp_path):
     assert not read('file = "without.h5"').is_stiffened
     assert not read('file = "with.h5"', "stiffening = false").is_stiffened
     assert_array_equal(read('file = "with.h5"').reduced.geometric.interfaces, reduced.geometric.interfaces)
-    with pytest.raises(SystemFileError, match="holds no geometric stiffness"):
+    with pytest.raises(SystemFileError, match="contains no geometric stiffness"):
         read('file = "without.h5"', "stiffening = true")
     rigid = "mass = 1.0\ninertia = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]"
     with pytest.raises(SystemFileError, match="stiffening: a rigid body has none"):

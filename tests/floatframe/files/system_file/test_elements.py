@@ -227,7 +227,7 @@ def test_sensors_of_couplers_and_control_measure_what_the_motion_has(write):
         (('"flores"', '"flroes"'), "dissipation.*did you mean 'flores'"),
         (("restitution = 0.5", "restitution = 2"), "restitution: expected 0 < e <= 1, got 2"),
         (("- ki*e", "- ki*ee"), "force 'pid': forces: phi: unknown name 'ee' at column 25.*did you mean 'e'"),
-        (("states = {e = 0.1}\n", ""), "a rate and a value at the start for each state"),
+        (("states = {e = 0.1}\n", ""), "a rate and an initial value for each state"),
         (('rates = {e = "phi', 'rates = {e = "sni(phi) + phi'), "rates: e: unknown function 'sni' at column 1"),
         (
             ('body_a = "wheel"\nbody_b', 'body_a = "weel"\nbody_b'),

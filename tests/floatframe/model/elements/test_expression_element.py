@@ -125,7 +125,7 @@ BAD = {
     "component": (lambda: ExpressionElement("e", PAIR, {"b_Fq": "1"}), "forces: no component 'b_Fq'"),
     "first": (lambda: ExpressionElement("e", PAIR, {"a_Fx": "1"}), "forces: no component 'a_Fx'"),
     "one place": (lambda: ExpressionElement("e", {"a": Marker("b")}), "places: expected two markers at least"),
-    "rates": (lambda: ExpressionElement("e", PAIR, states={"z": 0.0}), "expected a rate and a value at the start"),
+    "rates": (lambda: ExpressionElement("e", PAIR, states={"z": 0.0}), "expected a rate and an initial value"),
     "name": (lambda: ExpressionElement("e", PAIR, parameters={"t": 1.0}), "used once, got 't'"),
     "term": (lambda: ExpressionElement("e", PAIR, terms={"b_x": "1"}), "used once, got 'b_x'"),
     "later term": (lambda: run_with("late", early="late", late="1"), "element 'e': terms: early: unknown name 'late'"),

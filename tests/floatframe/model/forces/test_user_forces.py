@@ -326,13 +326,13 @@ def test_a_state_that_does_not_stand_is_not_linearised():
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: UserForce("u", {}), "coordinates: expected a dict with one coordinate"),
+        (lambda: UserForce("u", {}), "coordinates: expected a dict with at least one coordinate"),
         (lambda: UserForce("u", {"phi": 3}), "coordinates: phi: expected a coordinate of a joint"),
         (lambda: UserForce("u", {"a b": HUB["phi"]}, {}), "expected a name of letters, digits and _, got 'a b'"),
-        (lambda: UserForce("u", {"sin": HUB["phi"]}, {}), "the name 'sin' is used twice, or that of a function"),
+        (lambda: UserForce("u", {"sin": HUB["phi"]}, {}), "the name 'sin' is used twice, or is the name of a function"),
         (lambda: UserForce("u", HUB, {"psi": "1"}), "no coordinate 'psi'; choices: phi"),
         (lambda: UserForce("u", HUB, {}), "expected forces or states, got none"),
-        (lambda: UserForce("u", HUB, {}, {"e": "phi"}), "a rate and a value at the start for each state"),
+        (lambda: UserForce("u", HUB, {}, {"e": "phi"}), "a rate and an initial value for each state"),
         (lambda: UserForce("u", HUB, {"phi": "1"}, function=nonlinear), "with a function, forces names coordinates"),
         (lambda: UserForce("u", HUB, ("phi",)), "expected expressions by coordinate, or a function"),
         (lambda: UserForce("u", HUB, {"phi": "1"}, functions={"f": np.sin}), "functions: f: expected a function of"),
