@@ -66,8 +66,8 @@ def animate(
     magnification
         Factor of the elastic displacement as drawn; None: 1, or a round number if it would be invisible.
     up
-        Upward direction in ground axes, (3,); None: opposite to gravity if the trajectory contains it, else z, or y for
-        a motion in the xy plane.
+        Upward direction in ground axes, (3,); None: opposite to gravity if the trajectory contains it, otherwise z, or
+        y for a motion in the xy plane.
     color
         Quantity that colours flexible bodies: `DISPLACEMENT` or `VON_MISES` of `floatframe.pictures.body_colors`.
     system
@@ -126,7 +126,7 @@ def motion_scene(
     for name, reduced in flexible.items():
         if motions[name].q.shape[1] != reduced.n_q:
             raise ResultsError(
-                f"film: body {name!r} has {reduced.n_q} modes, but its motion {motions[name].q.shape[1]}"
+                f"film: body {name!r} has {reduced.n_q} modes, but its motion has {motions[name].q.shape[1]}"
             )
     rows = times.rows
     displacements = {name: nodal_displacements(trajectory, name, body, rows) for name, body in flexible.items()}

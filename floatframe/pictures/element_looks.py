@@ -22,7 +22,7 @@ COLOR = "#2a7f62"
 
 
 def shown_of(system: System, element: Element) -> tuple[MarkerShapes | Stretched | Arrow, ...]:
-    """Return the drawn parts of an element; those that stand in for shapes are omitted if its bodies have shapes.
+    """Return the drawn parts of an element; default shapes are omitted if its bodies have shapes of their own.
 
     Raises
     ------

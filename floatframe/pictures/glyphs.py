@@ -11,7 +11,7 @@
     bushing                              two rings round the axis z of A
     contact                              rings round the sphere
 
-A joint with the ground stands on a small hatched support.
+A joint with the ground has a small hatched support.
 """
 
 from collections.abc import Sequence

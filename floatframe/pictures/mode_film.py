@@ -28,7 +28,7 @@ N_FRAMES = 40  #: number of frames in one period
 FPS = 20.0
 SWING = 0.12  #: largest displacement, relative to the size of the system
 LARGEST_TURN = 0.5  #: largest rotation of a body in the film [rad]
-#: scale of the undeformed body relative to the moving one; below 1, so that it is hidden where nothing moves
+#: scale of the undeformed body relative to the moving one; below 1, so that a part that does not move hides it
 INSIDE = 0.99
 GHOST_COLOR, RIGID_COLOR = "#c3cbd2", "#9fb0bf"
 
@@ -95,7 +95,7 @@ def draw_mode(
     path
         File whose name ends in .png.
     color
-        What the colours show, as for `animate_mode`.
+        Quantity that the colours show, as for `animate_mode`.
     """
     return render_picture(mode_scene(system, about, modes, number, np.ones(1, complex), color=color), path)
 
@@ -157,7 +157,7 @@ def mode_scene(
         triads=tuple(triads),
         title=f"{system.name}: mode {number}, {frequency_words(modes, number, units.time)}",
         captions=(moving_words(modes, number) + f"; ground grid {step:g} {units.length_symbol}",),
-        scalar_title=("displacement" if color is DISPLACEMENT else color.title) + ", by the largest",
+        scalar_title=("displacement" if color is DISPLACEMENT else color.title) + " / largest value",
         scalar_range=(0.0, 1.0),
         direction=direction,
         up=up,
@@ -238,7 +238,7 @@ def frequency_words(modes: SystemModes, number: int, time_unit: float) -> str:
     """Return frequency and damping of a mode as text."""
     f, ratio = float(modes.frequencies[number - 1]) / time_unit, float(modes.damping_ratios[number - 1])
     if f == 0:
-        return "a motion that costs nothing" if ratio == 0 else ("decays" if ratio > 0 else "grows")
+        return "a motion without resistance" if ratio == 0 else ("decays" if ratio > 0 else "grows")
     damping = f", damping {100 * ratio:.2g} %" if ratio > 1e-9 else (", grows" if ratio < -1e-9 else "")
     return f"{f:.4g} Hz{damping}"
 

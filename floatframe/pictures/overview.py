@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["free_legends", "plot_deformation", "plot_loads", "plot_overview", "plot_places"]
 
-LEGEND_GAP = 0.03  #: between curves and a legend above them, as a share of the height of a panel
+LEGEND_GAP = 0.03  #: gap between curves and a legend above them, as a share of the height of a panel
 MOST_LEGEND = 0.5  #: largest share of the height of a panel that is kept free for a legend
 MOST_CURVES = 8  #: largest number of curves in a plot; if there are more, those with the largest values are drawn
 

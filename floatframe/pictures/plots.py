@@ -89,7 +89,7 @@ def plot_reaction(trajectory: Trajectory, name: str, ax: "Axes | None" = None) -
 def plot_drift(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
     """Plot the constraint error of each joint, as distance and angle, on a logarithmic axis.
 
-    Errors that stay below `SHOWN` times the largest one are rounding; their number is written beside the curves.
+    Errors that stay below `SHOWN` times the largest one are rounding errors; the figure states their number.
     """
     ax, length = axes_for(trajectory, ax), trajectory.units.length_symbol
     sizes = {}

@@ -19,8 +19,8 @@ def box_of(
 ) -> tuple[Array, IntArray]:
     """Return corners, (8, 3) in the body frame, and triangles of the box with the body's inertia, or of a cube.
 
-    Half edges are at most `most`, so that a large inertia does not fill the picture; but the box always reaches the
-    connections, points in the body frame, (n, 3).
+    Half edges are at most `most`, so that a box with a large inertia does not fill the picture; but the box always
+    reaches the connections, points in the body frame, (n, 3).
 
     A box with half edges a, b, c has I_1 = m/3 (b² + c²) and so on, so that a² = 3/(2m) (I_2 + I_3 - I_1).
     """
@@ -53,7 +53,7 @@ def view_axes(points: Array, up: Array) -> tuple[Array, Array]:
 
 
 def film_size(points: Array, direction: Array, up: Array) -> tuple[int, int]:
-    """Return width and height of a film [px]: low where the points, (n, 3), lie side by side in the given view."""
+    """Return width and height of a film [px]; it is low if the points, (n, 3), are side by side in the given view."""
     forward = direction / np.linalg.norm(direction)
     above = up - (up @ forward) * forward
     above /= np.linalg.norm(above)

@@ -64,8 +64,8 @@ def placed_law(system: System, name: str, where: str = "element_motion") -> Plac
 def element_motion(system: System, trajectory: Trajectory, name: str) -> ElementMotion:
     """Return outputs, states, multipliers and wrenches of a public element during a motion of the system.
 
-    States and multipliers are taken from the motion. Outputs and wrenches are evaluated by the law of the element from
-    these and the motion of the markers; while events have switched the element off, by its `off` law.
+    States and multipliers are taken from the motion. The law of the element computes outputs and wrenches from these
+    and from the motion of the markers; while events have switched the element off, its `off` law does.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def marker_place(system: System, trajectory: Trajectory, marker: MarkerData) -> 
 
 
 def motion_row(place: PlaceMotion, accelerations: bool) -> Array:
-    """Return position, axes row by row, velocity, angular velocity, (n_t, 18), and if wanted their rates, (n_t, 24)."""
+    """Return position, axes row by row, velocity and angular velocity, (n_t, 18), or with their rates, (n_t, 24)."""
     parts = [place.position, place.axes.reshape(-1, 9), place.velocity, place.omega]
     if accelerations:
         parts += [place.acceleration, np.zeros_like(place.omega) if place.alpha is None else place.alpha]

@@ -118,7 +118,7 @@ def export_vtk(
     bodies
         Reduced bodies by name.
     path
-        Name that ends in .pvd; the .vtu files go into a folder with the same name without the ending.
+        Name that ends in .pvd; the .vtu files are written to a folder with the same name without the ending.
     every
         Step between the output times that are written.
     on_frame
@@ -260,7 +260,8 @@ def run_record(trajectory: Trajectory, system: System | None = None) -> dict[str
 def sensors_record(system: System, trajectory: Trajectory) -> dict[str, Any]:
     """Return unit, smallest, largest and last value of every quantity that the system's sensors measure.
 
-    `peak` holds the time at which the magnitude is largest, and the numbers of the place (node, instance) then.
+    `peak` contains the time at which the magnitude is largest, and the numbers of the place (node, instance) at that
+    time.
     """
     record = {}
     for measurement in measured(system, trajectory).values():

@@ -1,4 +1,4 @@
-"""Angles counted through full turns: from the turns that the run counted, else from one output to the next."""
+"""Angles counted through full turns: by the turns that the run counted, otherwise from one output to the next."""
 
 import numpy as np
 
@@ -58,7 +58,7 @@ def followed_angle(where: str, t: Array, value: Array, rate: Array) -> Array:
         k = int(np.argmax(is_lost))
         raise ResultsError(
             f"{where}: the angle cannot be followed from t = {t[k]:.6g} to {t[k + 1]:.6g}, where it turns by about "
-            f"{expected[k]:.3g} rad, and the run did not count it; write results of more steps (output_every), or give "
+            f"{expected[k]:.3g} rad, and the run did not count it; write results more often (output_every), or add "
             "the sensor to the system before the run"
         )
     return np.concatenate([value[:1], value[:1] + np.cumsum(step)])

@@ -41,7 +41,7 @@ class Head:
     #: first column in w of each connection (joints, springs, couplers, user forces), then the number of columns
     w0: tuple[int, ...]
     run: Mapping[str, Any]  #: integrator and its parameters, h, t_end, version
-    #: of a completed run: n_steps, n_rejected, n_iterations (Newton), wall_time [s]
+    #: for a completed run: n_steps, n_rejected, n_iterations (Newton), wall_time [s]
     summary: Mapping[str, Any] = field(default_factory=dict)
     angles: tuple[CountedAngle, ...] | None = None  #: angles in the columns of `angle`; None: not counted
     #: for each sensor, descriptions of the nodes that it uses on flexible bodies, with their distance from the given
@@ -79,7 +79,7 @@ def head_of_text(text: Any) -> Head:
     require(is_list(data["bodies"], dict) and data["bodies"], "bodies", "a list of objects", data["bodies"])
     bodies = entries_of(data["bodies"])
     n_connections, w0 = len(data["joints"]) + len(data["springs"]), data["w0"]
-    # couplers and user forces have columns too, after those of joints and springs, but no names here
+    # couplers and user forces also have columns, after those of joints and springs, but no names in these lists
     require(is_list(w0, int) and len(w0) > n_connections and w0[0] == 0 and w0 == sorted(w0),
             "w0", f"at least {n_connections + 1} whole numbers that ascend from 0", w0)  # fmt: skip
     summary = data.get("summary", {})

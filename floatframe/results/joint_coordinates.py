@@ -41,12 +41,13 @@ class SlidingPlace:
     s: Array  #: distance from marker A along the undeformed line, (n_t,) [m]
     rate: Array  #: rate of s, (n_t,) [m/s]
     tangent: Array  #: unit tangent of the deformed line, ground axes, (n_t, 3)
-    #: derivative of the line's rotation by s, divided by the slope of the line, ground axes, (n_t, 3) [1/m]
+    #: derivative of the line's rotation by its deformed arc length (by s, divided by |dr/ds|), ground axes, (n_t, 3)
+    #: [1/m]
     turning: Array
 
 
 def sliding_place(system: System, trajectory: Trajectory, joint: SlidingJoint, end: PlaceMotion) -> SlidingPlace:
-    """Return the position along the line of marker B for its motion; as in kernels/joints/deformed_line.py."""
+    """Return the position of marker B along the line, from its motion, as in kernels/joints/deformed_line.py."""
     name = body_name(joint.marker_a.body)
     body = system.body(name)
     assert isinstance(body, FlexibleBody)
@@ -250,7 +251,7 @@ def force_rows(small: SmallMotions, joint: str, coordinate: str) -> Rows | None:
 def sliding_motion(
     system: System, trajectory: Trajectory, joint: SlidingJoint, marker_b: MarkerData
 ) -> CoordinateMotion:
-    """Return the position along a deformed line; its force belongs to the drive, zero for free sliding."""
+    """Return the position along a deformed line; the force is that of the drive, zero for free sliding."""
     b = end_motion(system, trajectory, marker_b)
     place = sliding_place(system, trajectory, joint, b)
     first = trajectory.head.w0[[each.name for each in system.joints].index(joint.name)]

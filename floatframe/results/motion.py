@@ -52,7 +52,7 @@ class Motion(Trajectory):
     head, source, is_complete, path, validity
         As in `Trajectory`.
     known
-        The system, or a function that finds it when needed; None: not known.
+        The system, or a function that returns it when needed; None: unknown.
     """
 
     known: System | Callable[[], System | None] | None = None
@@ -104,13 +104,13 @@ class Motion(Trajectory):
     def measurements(self, *names: str) -> tuple[Measurement, ...]:
         """Return measurements of sensors and coordinates by name, with wildcards * and ?; all if no name is given.
 
-        The name of a joint stands for its coordinates and its reaction, that of a body for the position of its origin,
-        that of a controller for its outputs and states.
+        The name of a joint stands for its coordinates and its reaction, the name of a body for the position of its
+        origin, and the name of a controller for its outputs and states.
 
         Raises
         ------
         ModelError
-            If names fit nothing.
+            If a name matches nothing.
         """
         system = self.system
         if names:
@@ -158,7 +158,7 @@ class Motion(Trajectory):
     def to_dataframe(self, *names: str) -> "DataFrame":
         """Return a pandas DataFrame of measurements over time (see `measurements`), columns such as "tip x".
 
-        The units stand in `attrs["units"]`, by column. Needs pandas (`pip install "floatframe[tables]"`).
+        The units are in `attrs["units"]`, by column. Needs pandas (`pip install "floatframe[tables]"`).
         """
         return self.to_table(*names).to_dataframe("t")
 
@@ -183,7 +183,7 @@ class MovedBody(BodyMotion):
         """The reduced body; `ResultsError` if this body is rigid."""
         body = self.motion.system.body(self.name)
         if not isinstance(body, FlexibleBody):
-            raise ResultsError(f"body {self.name!r}: it is rigid; it has no interfaces, nodes or stress")
+            raise ResultsError(f"body {self.name!r} is rigid: it has no interfaces, nodes or stress")
         return body.reduced
 
     def interface(self, name: str) -> PlaceMotion:

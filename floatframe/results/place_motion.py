@@ -173,7 +173,7 @@ def point_motion(
     if trajectory.entry(body)[1].n_q and not undeformed:
         raise ResultsError(
             f"body {body!r} is flexible: a point fixed in its frame does not deform with it; give its modal file, "
-            "reduced=, so that the kept node there is taken, or, where the frame alone is meant, undeformed=True"
+            "reduced=, so that the kept node there is used, or undeformed=True for the motion of the frame alone"
         )
     motion = trajectory.body(body)
     shape = MarkerShape(np.asarray(point, dtype=float), np.eye(3))
@@ -279,7 +279,7 @@ def stress_modes(body: str, reduced: ReducedBody) -> Array:
     """Return the stress modes of a body, (n_kept, 6, n_q); `ResultsError` if its file has none."""
     if reduced.stress is None:
         raise ResultsError(
-            f"body {body!r}: its modal file holds no stress modes; reduce it again with stress (and from a mesh, since "
-            "bare matrices know no stress)"
+            f"body {body!r}: its modal file contains no stress modes; reduce it again with stress, from a mesh, "
+            "because matrices alone have no stress"
         )
     return reduced.stress

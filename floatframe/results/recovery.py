@@ -30,8 +30,8 @@ def require_same_modes(trajectory: Trajectory, body_name: str, reduced: ReducedB
 def nodal_positions(trajectory: Trajectory, body_name: str, reduced: ReducedBody, i_time: int) -> Array:
     """Return the positions of the kept nodes of a flexible body at an output time, in ground axes, (n_kept, 3) [m].
 
-    r + R (c + Phi q), with all modes of the body including static ones; for a stiffened body with quadratic modes also
-    the second-order part.
+    The position is r + R (c + Phi q), with all modes of the body including static ones; for a stiffened body with
+    quadratic modes the second-order part is added.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def nodal_positions(trajectory: Trajectory, body_name: str, reduced: ReducedBody
 def nodal_displacements(trajectory: Trajectory, body_name: str, reduced: ReducedBody, i_time: int | IntArray) -> Array:
     """Return the displacements of the kept nodes in the body frame at output times, (..., n_kept, 3) [m].
 
-    Phi q, plus ½ Σ q_k q_l g_kl for a stiffened body with quadratic modes.
+    The displacement is Phi q, plus ½ Σ q_k q_l g_kl for a stiffened body with quadratic modes.
     """
     require_same_modes(trajectory, body_name, reduced)
     _, entry = trajectory.entry(body_name)
@@ -69,7 +69,7 @@ def interface_positions(trajectory: Trajectory, body_name: str, reduced: Reduced
 def elastic_displacements(trajectory: Trajectory, body_name: str, reduced: ReducedBody, interface: str) -> Array:
     """Return the displacement of an interface in the body frame over time, (n_t, 3) [m].
 
-    Psi q, plus the second-order part for a stiffened body, such as the shortening of a bent rod.
+    The displacement is Psi q, plus the second-order part for a stiffened body, such as the shortening of a bent rod.
     """
     require_same_modes(trajectory, body_name, reduced)
     _, entry = trajectory.entry(body_name)

@@ -135,7 +135,7 @@ def segment_paths(folder: Path) -> list[Path]:
     paths = sorted(folder.glob("[0-9]*.h5"))
     for k, path in enumerate(paths):
         if path.name != f"{k:06d}.h5":
-            raise ResultsError(f"{folder}: {k:06d}.h5 is missing among the segments of the run; run it anew")
+            raise ResultsError(f"{folder}: {k:06d}.h5 is missing among the segments of the run; repeat the run")
     return paths
 
 
@@ -158,8 +158,8 @@ def checked(path: Path, *, tell_age: bool = True) -> Iterator[tuple[Any, dict[st
         if not has_seal and stated >= 2:
             require_digest(items, path, KIND)
         if not has_seal and stated < 2 and tell_age:
-            log.warning("%s: this results file is of version 1, which carries no checksum: damage to its numbers would "
-                        "not be noticed; a new run writes one that does", path)  # fmt: skip
+            log.warning("%s: this results file is of version 1, which has no checksum, so that damage to its numbers "
+            "cannot be detected; a new run writes a file with checksums", path)  # fmt: skip
         yield file, items
 
 
@@ -168,7 +168,7 @@ def read_head(path: Path, file: Any) -> tuple[Head, bool]:
     try:
         head = head_of_text(as_attribute(file.attrs.get("head")))
     except ValueError as error:
-        raise ResultsError(f"{path}: {error}; the file is damaged, or of a faulty writer") from error
+        raise ResultsError(f"{path}: {error}; the file is damaged, or was written by a faulty program") from error
     return head, bool(file.attrs.get("is_complete", False))
 
 
@@ -182,10 +182,12 @@ def require_datasets(path: Path, items: Mapping[str, Any], shapes: Mapping[str, 
             raise ResultsError(f"{path}: dataset {name!r} is missing or misshapen; the file is damaged")
         for first in range(0, n_t, ROWS_CHECKED):
             if not np.isfinite(item[first : first + ROWS_CHECKED]).all():
-                raise ResultsError(f"{path}: dataset {name!r}: expected finite numbers; the file is of a faulty writer")
+                raise ResultsError(
+                    f"{path}: dataset {name!r}: expected finite numbers; the file was written by a faulty program"
+                )
     assert isinstance(t, h5py.Dataset)
     if (np.diff(t[...]) <= 0).any():
-        raise ResultsError(f"{path}: dataset 't': expected times that ascend; the file is damaged")
+        raise ResultsError(f"{path}: dataset 't': expected increasing times; the file is damaged")
     return n_t
 
 
@@ -201,7 +203,9 @@ def open_segments(folder: Path) -> tuple[Head, FileSource]:
         with checked(path, tell_age=False) as (file, items):
             if require_datasets(path, items, shapes):
                 if file["t"][0] <= last:
-                    raise ResultsError(f"{path}: its times do not go on from the segment before; run it anew")
+                    raise ResultsError(
+                        f"{path}: its times do not continue those of the previous segment; repeat the run"
+                    )
                 last = file["t"][-1]
     return head, FileSource(tuple(paths), shapes)
 

@@ -26,10 +26,10 @@ def chosen_measurements(system: System, trajectory: Trajectory, names: Sequence[
     """Return the measurements of the named sensors, each once, in the order of the names.
 
     A name is that of a sensor, of a column, "sensor.column" or "sensor column", or of a coordinate, "joint.coordinate".
-    The name of a joint stands for its coordinates and its reaction, that of a body for the position of its origin, that
-    of a controller for its outputs and states.
-    In names of sensors and coordinates, * stands for any letters and ? for one letter; if none matches, also in
-    "sensor.column".
+    The name of a joint stands for its coordinates and its reaction, the name of a body for the position of its origin,
+    and the name of a controller for its outputs and states.
+    In names of sensors and coordinates, * stands for any letters and ? for one letter; if no name matches,
+    "sensor.column" is searched as well.
 
     Raises
     ------
@@ -64,11 +64,11 @@ def chosen_measurements(system: System, trajectory: Trajectory, names: Sequence[
             if fnmatchcase(f"{key}.{column}", pattern_of(name))
         ]
         if not columns:
-            missing.append(f"{quoted(name)}: no sensor, column or coordinate fits{nearest(name, known)}")
+            missing.append(f"{quoted(name)}: no sensor, column or coordinate matches{nearest(name, known)}")
         found |= {column.sensor: column for column in columns}
     if missing:
         lines = missing if len(missing) == 1 else ["", *(f"  {each}" for each in missing)]
-        raise ModelError(f"system {system.name!r}: sensors that are not there: " + "\n".join(lines))
+        raise ModelError(f"system {system.name!r}: unknown sensors: " + "\n".join(lines))
     return list(found.values())
 
 
@@ -78,7 +78,7 @@ def is_wild(name: str, known: Sequence[str]) -> bool:
 
 
 def pattern_of(name: str) -> str:
-    """Return a pattern in which brackets stand for themselves."""
+    """Return a pattern in which brackets are literal."""
     return name.replace("[", "[[]")
 
 
@@ -88,7 +88,7 @@ def controller_samples(system: System, trajectory: Trajectory, name: str) -> Mea
     Raises
     ------
     ResultsError
-        If the motion has no such controller, or was ended before its samples were stored.
+        If the motion has no such controller, or ended before its samples were stored.
     """
     stored = trajectory.head.summary.get("controllers", {})
     if name not in stored:
@@ -103,7 +103,7 @@ def controller_samples(system: System, trajectory: Trajectory, name: str) -> Mea
 
 
 def held_between(samples: Measurement, t: Array) -> Measurement:
-    """Return samples, held from each instant to the next, at times t, (n_t,)."""
+    """Return samples at times t, (n_t,), constant from each sampling instant to the next."""
     period = float(samples.t[1] - samples.t[0]) if len(samples.t) > 1 else 1.0
     k = np.maximum(np.searchsorted(samples.t - SAME_TIME * period, t, side="right") - 1, 0)
     return Measurement(samples.sensor, t, {key: values[k] for key, values in samples.columns.items()}, samples.units)

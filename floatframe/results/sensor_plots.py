@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 __all__ = ["figure_of", "groups_of", "labelled", "panels_of", "plot_columns", "plot_measurement", "plot_sensors"]
 
-ROUNDING = 1e-9  #: size relative to the largest column of a unit below which a curve is a rounding error
+ROUNDING = 1e-9  #: magnitude, relative to the largest column of a unit, below which a curve is a rounding error
 MOST_CURVES = 12  #: largest number of curves in a panel; further columns go into additional panels
 N_COLORS = 10  #: number of colours, after which they repeat with dashed lines
 LONG_LEGEND = 6  #: number of entries above which a legend has two columns
@@ -85,7 +85,7 @@ def plot_columns(measurements: Sequence[Measurement], ax: "Axes", *, time_symbol
         words = "; ".join(f"{', '.join(names)} [{unit}]" for unit, names in units.items())
         raise ResultsError(
             f"plot: expected columns of one unit for the given axes, got {words or 'nothing'}; name columns, such as "
-            '"tip x", or leave the axes out'
+            '"tip x", or omit the axes'
         )
     ((unit, names),) = units.items()
     ax.set_xlabel(f"time [{time_symbol}]")

@@ -178,8 +178,8 @@ class Trajectory:
     def state(self, i_time: int) -> State:
         """Return the state at an output time (-1: the last), for example as the initial state of another motion.
 
-        States of elements and user forces, and counted angles, go on in that motion (`State.w`, `State.angle`), and so
-        do the errors that the watch has found up to the last time (`State.watched`).
+        The other motion continues the states of elements and user forces, the counted angles (`State.w`,
+        `State.angle`), and the errors that the watch has found up to the last time (`State.watched`).
         """
         r, p, q, u, w = (self.source.read(name)[i_time] for name in ("position", "euler_parameters", "q", "u", "w"))
         angle = None if self.head.angles is None else self.source.read("angle")[i_time]

@@ -29,8 +29,8 @@ class ValidityNote:
     motion); one for energy that the steps add ("energy") and one for energy that they remove ("damping"), relative to
     the energy in motion. These name the body most affected. There is one note for each supply, load, drive or user law
     that the steps do not resolve ("frequency", "knots" of a table, "law"), and for each bushing and bearing with large
-    angles ("angles", "tilt": the difference between interpretations of the angles). These have their place in the
-    system instead of a body.
+    angles ("angles", "tilt": the difference between interpretations of the angles). These notes name a place in
+    the system instead of a body.
 
     Parameters
     ----------
@@ -107,24 +107,24 @@ class ValidityNote:
             )
         if self.kind == "angles":
             return (
-                f"it rotates so far about several axes that its angles, the components of the rotation vector, are "
-                f"{100 * self.largest:.2g} % off Cardan angles (limit {100 * self.limit:g} %)"
+                f"it rotates so far about several axes that its angles, the components of the rotation vector, differ "
+                f"from Cardan angles by {100 * self.largest:.2g} % (limit {100 * self.limit:g} %)"
             )
         if self.kind == "tilt":
             return (
-                f"its shaft tilts so far that its sine, on which the moment depends, is {100 * self.largest:.2g} % "
-                f"below the angle (limit {100 * self.limit:g} %)"
+                "its shaft tilts so far that the sine of the tilt, on which the moment depends, is "
+                f"{100 * self.largest:.2g} % below the angle (limit {100 * self.limit:g} %)"
             )
         if self.kind == "rotation":
-            return f"an interface turns by {self.largest:.3g} rad against the body frame (limit {self.limit:g})"
+            return f"an interface rotates by {self.largest:.3g} rad relative to the body frame (limit {self.limit:g})"
         if self.kind == "inertia":
             return (
-                f"it turns with {self.largest:.3g} of its lowest frequency as held (limit {self.limit:g}), while "
+                f"it rotates with {self.largest:.3g} of its lowest frequency as held (limit {self.limit:g}), while "
                 f"inertia terms are omitted: the relative error of its deformation is of the order of "
                 f"{self.largest**2:.1g}"
             )
         if self.kind == "speed":
-            return f"it turns with {self.largest:.3g} of its lowest frequency as held (limit {self.limit:g})"
+            return f"it rotates with {self.largest:.3g} of its lowest frequency as held (limit {self.limit:g})"
         if self.is_stiffened:
             return f"its loads reach {self.largest:.3g} of its buckling loads (limit {self.limit:g})"
         change = f"{100 * self.largest:.3g} % (limit {100 * self.limit:g} %)"
@@ -142,8 +142,8 @@ class ValidityNote:
         if self.kind == "rotation" and 0 <= self.in_mean_axes < self.largest:
             frame = 'take mean axes (cms frame --to tisserand, [body] frame = "tisserand")'
             if self.in_mean_axes <= self.limit:
-                return f"{frame}: there it turns by {self.in_mean_axes:.3g} rad, within the limit"
-            return f"{frame}: there it turns by {self.in_mean_axes:.3g} rad; then {self.next_action}"
+                return f"{frame}: there it rotates by {self.in_mean_axes:.3g} rad, within the limit"
+            return f"{frame}: there it rotates by {self.in_mean_axes:.3g} rad; then {self.next_action}"
         return self.next_action
 
     @property

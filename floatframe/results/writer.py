@@ -163,14 +163,14 @@ class ResultsPlace(AbstractContextManager["ResultsPlace"]):
         if is_stream(self.path):
             raise ResultsError(f"{where}: expected a file name, got a device or a pipe; a run writes its file in parts")
         if not self.path.parent.is_dir():
-            raise ResultsError(f"{where}: no such folder {str(self.path.parent)!r}; make it")
+            raise ResultsError(f"{where}: no such folder {str(self.path.parent)!r}; create it")
         for source in inputs:
             if same_file(self.path, Path(source)):
                 raise ResultsError(f"{where}: this is an input of the run; choose another name")
         self.path = self.path.resolve()  # resolves a link, so that the link is kept
         self.folder = segments_folder(self.path)
         if is_begun and not self.folder.is_dir():
-            state = "the run is complete" if self.path.is_file() else "no run to this name was begun"
+            state = "the run is complete" if self.path.is_file() else "no run with this name was begun"
             raise ResultsError(f"{given}: nothing to resume: there is no folder {str(self.folder)!r}; {state}")
         self.lock = self.locked(where)
 
@@ -185,7 +185,7 @@ class ResultsPlace(AbstractContextManager["ResultsPlace"]):
                     continue
         except LockedError as holder:
             raise ResultsError(
-                f"{where}: another run writes to it now ({holder}); wait for its end, end it, or choose another name"
+                f"{where}: another run writes to it now ({holder}); wait until it ends, stop it, or choose another name"
             ) from None
         except OSError as error:
             raise ResultsError(f"{where}: cannot be written: {reason(error)}") from error
@@ -322,7 +322,7 @@ class ResultsWriter:
         if len(source.paths) != self.n_segments or sum(map(rows_in, source.paths)) != self.n_rows:
             raise ResultsError(
                 f"{self.folder}: expected {self.n_segments} segments with {self.n_rows} rows, got {len(source.paths)} "
-                "others: the folder was changed while the run lasted; run it anew"
+                "others: the folder was changed during the run; repeat the run"
             )
         self.head = replace(self.head, summary=summary)
         last = self.open_arrays() if self.open_rows else {}

@@ -4,9 +4,9 @@
     displacement          |Σ_k a_k phi_k|
     von Mises' stress     sqrt(3/2 s:s) of s = Σ_k a_k s_k
 
-The amplitudes are the modal coordinates q; of a body with quadratic modes the part of second order, ½ Σ q_k q_l g_kl,
-follows with amplitudes and shapes of its own (leading ones of its history). What moves no shown node by 1e-5 of the
-largest displacement, and stresses none by 1e-3 of the largest stress, is left out.
+The amplitudes are the modal coordinates q. For a body with quadratic modes, the second-order part ½ Σ q_k q_l g_kl is
+added with its own amplitudes and shapes (the leading ones of its history). Shapes that move every shown node by less
+than 1e-5 of the largest displacement, and change every stress by less than 1e-3 of the largest stress, are omitted.
 """
 
 from dataclasses import dataclass
@@ -41,9 +41,10 @@ class FlexibleSurface:
 
 
 def nodes_within(n_bytes: float, bodies: dict[str, ReducedBody], *, with_stress: bool) -> dict[str, int]:
-    """Return how many nodes of each body may be shown so that all its data fit into `n_bytes`.
+    """Return the number of nodes of each body that may be shown so that the data of all bodies fit into `n_bytes`.
 
-    Bodies get nodes by the root of those they have, so that a small one beside a large one stays fine.
+    The numbers are proportional to the square roots of the numbers of nodes, so that a small body beside a large
+    one is still drawn finely.
     """
     has = {name: len(np.unique(body.surface)) for name, body in bodies.items() if len(body.surface)}
     parts = {name: 9 if with_stress and bodies[name].stress is not None else 3 for name in has}
@@ -64,7 +65,7 @@ def flexible_surface(
     Parameters
     ----------
     q
-        Modal coordinates in the shown rows, or, for pages of modes, those each mode reaches, (n_rows, n_q).
+        Modal coordinates in the shown rows; for pages of modes, the largest ones in each mode, (n_rows, n_q).
     """
     surface = shown_surface(body.nodes, body.surface, most)
     shapes = np.moveaxis(np.asarray(body.Phi)[surface.rows], 2, 0)
@@ -106,7 +107,7 @@ def largest_displacement(shapes: Array, amplitudes: Array) -> float:
 
 def second_order(body: ReducedBody, surface: ShownSurface, q: Array) -> tuple[Array, Array]:
     """Return amplitudes (n_rows, k) and shapes (k, n, 3) of the leading second-order displacements in its history."""
-    assert body.quadratic is not None  # asked by the caller
+    assert body.quadratic is not None  # checked by the caller
     g = np.asarray(body.quadratic)[surface.rows]
     n, n_q = len(g), body.n_q
     pairs = 0.5 * (q[:, :, None] * q[:, None, :]).reshape(len(q), n_q * n_q)

@@ -74,7 +74,7 @@ def view_modes(
     bodies = {body.name: body for body in system.bodies}
     reduced = {name: body.reduced for name, body in bodies.items() if isinstance(body, FlexibleBody)}
     if color == "von-mises" and not any(body.stress is not None for body in reduced.values()):
-        raise ResultsError("view: von Mises' stress is asked for, but no body of the system has stress modes")
+        raise ResultsError("view: the von Mises stress is requested, but no body of the system has stress modes")
     shown = Shown(rest, system, dict(bodies), reduced, np.zeros(1, np.int64))
     parts = parts_of(rest, shapes)
     block, surfaces, elastic = Block(), [], {}

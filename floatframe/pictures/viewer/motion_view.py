@@ -69,7 +69,7 @@ log = logging.getLogger(__name__)
 
 
 MOST_ROWS = 4000  #: largest number of rows in a page
-FASTEST = 2.6  #: rotation of a body between rows [rad] up to which its direction of rotation is visible correctly
+FASTEST = 2.6  #: rotation of a body between rows [rad] above which it may seem to rotate in the wrong direction
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,7 @@ def evenly(t: Array, most: int) -> IntArray:
 
 
 MOST_CURVES, MOST_PANELS = 6, 14  #: largest number of curves in a panel, and of sensor panels
-SEEN = 1e-4  #: size relative to the largest curve of a panel below which a curve counts as zero
+SEEN = 1e-4  #: magnitude, relative to the largest curve of a panel, below which a curve counts as zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +164,7 @@ def motion_panels(trajectory: Trajectory, bodies: Mapping[str, ReducedBody], row
 
 
 def largest(values: Array) -> float:
-    """Return the largest size of finite values."""
+    """Return the largest absolute value of the finite values."""
     finite = values[np.isfinite(values)]
     return float(np.abs(finite).max(initial=0.0))
 
@@ -276,7 +276,7 @@ def view(
         require_same_modes(trajectory, name, body)
     if color == "von-mises" and not any(body.stress is not None for body in reduced.values()):
         raise ResultsError(
-            "view: von Mises' stress is asked for, but no body of the motion has stress modes"
+            "view: the von Mises stress is requested, but no body of the motion has stress modes"
             + (f" ({', '.join(reduced)})" if reduced else ": all are rigid")
             + "; reduce them again with stress, or colour by displacement"
         )
@@ -357,7 +357,7 @@ def loose_bodies(trajectory: Trajectory, system: System | None) -> Mapping[str, 
         return bodies_of(trajectory)
     except CmsError as error:
         raise ResultsError(
-            f"view: a flexible body cannot be shown: {error}; put the modal file back to where the run had it"
+            f"view: a flexible body cannot be shown: {error}; put the modal file back where the run found it"
         ) from error
 
 
@@ -408,7 +408,9 @@ def panels_of_motion(
         return [], rows
     if sensors:
         if system is None:
-            raise ResultsError("view: sensors: the system file of the run is gone, or the run was made in Python")
+            raise ResultsError(
+                "view: sensors: the system file of the run does not exist any more, or the run was made in Python"
+            )
         return sensor_panels(chosen_measurements(system, trajectory, sensors), rows), rows
     own = [] if system is None else sensor_panels([*measured(system, trajectory).values()], rows)
     return own + motion_panels(trajectory, reduced, rows), rows
@@ -474,8 +476,8 @@ def notes_of(shown: Shown, kept: Timeline, surfaces: Sequence[FlexibleSurface]) 
         notes.append("Between rows positions and modal coordinates are interpolated linearly, rotations along the arc.")
     if kept.turns_too_far:
         notes.append(
-            f"A body turns by {kept.largest_turn:.3g} rad from row to row: it may seem to turn the other way; write "
-            "results more often."
+            f"A body rotates by {kept.largest_turn:.3g} rad between rows, so that it may seem to rotate backwards; "
+            "write results more often."
         )
     notes += surface_notes(trajectory.body_names, surfaces)
     for note in trajectory.validity:
@@ -533,13 +535,13 @@ def unit_record(trajectory: Trajectory) -> dict[str, Any]:
 
 
 def written(path: str | os.PathLike[str], record: dict[str, Any], block: Block, largest: float) -> Page:
-    """Write the page; `ResultsError` if it is larger than it may be."""
+    """Write the page; `ResultsError` if it is too large."""
     target = Path(path)
     content = page_of(record, block).encode()
     if len(content) > 1e6 * largest:
         raise ResultsError(
-            f"view: the page would have {len(content) / 1e6:.1f} MB, more than {largest:g} MB, though surfaces are "
-            "thinned; name fewer sensors, leave shapes of large surfaces out, or allow more megabytes"
+            f"view: the page would have {len(content) / 1e6:.1f} MB, more than {largest:g} MB, although surfaces are "
+            "thinned; name fewer sensors, remove shapes with large surfaces, or allow more megabytes"
         )
     replace_file(target, content)
     return Page(target, len(content), tuple(record["notes"]))

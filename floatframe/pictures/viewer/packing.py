@@ -1,7 +1,7 @@
 """Arrays as text inside a page: one compressed block of bytes, and the location of each array in it.
 
 quantised     value = offset + scale * n, with 16 bit integers n; one scale and offset, or one for each index of an axis
-split         of 16 bit: all low bytes, then all high bytes, which compress better than pairs
+split         16-bit numbers as all low bytes, then all high bytes, which compress better than pairs
 text          base64 of the zlib stream (RFC 1950) of the block; numbers little-endian
 """
 

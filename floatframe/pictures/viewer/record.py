@@ -63,7 +63,7 @@ __all__ = [
 
 
 # element cast ---------------------------------------------------------------------------------------------------------
-# What public elements show of themselves in a page: `Element.drawn()` on their markers, arrows of their outputs.
+# Appearance of public elements in a page: `Element.drawn()` on their markers, and arrows of their outputs.
 
 
 def elements_cast(cast: Cast) -> None:
@@ -364,7 +364,7 @@ def colors_record(units: Units, displacement: float, stress: float | None) -> li
 # drawings of joints, forces and elements in a page: small solids on markers, springs, arrows of loads -----------------
 
 
-#: size of a joint, divided by the size of the scene, up to so many bodies; smaller for more bodies
+#: size of a joint, divided by the size of the scene, and number of bodies above which joints are drawn smaller
 SIZE, FEW = 0.012, 4
 GROUND_COLOR = "#7b8790"
 Z = np.array([0.0, 0.0, 1.0])

@@ -35,9 +35,9 @@ def shown_surface(nodes: Array, triangles: IntArray, most: int) -> ShownSurface:
     Parameters
     ----------
     nodes, triangles
-        (n, 3) and (n_triangles, 3).
+        Nodes, (n, 3), and triangles, (n_triangles, 3), of the surface.
     most
-        How many nodes may be shown.
+        Largest number of shown nodes.
     """
     rows, local = np.unique(triangles, return_inverse=True)
     local = local.reshape(-1, 3)
@@ -66,7 +66,7 @@ def thinned(nodes: Array, triangles: IntArray, most: int) -> tuple[IntArray, Int
     mesh.point_data["row"] = np.arange(len(nodes))
     for _ in range(TRIES):
         share = 1.0 - most / mesh.n_points
-        for keeps_form in (True, False):  # holes and thin walls may leave nothing to take away otherwise
+        for keeps_form in (True, False):  # holes and thin walls can be thinned only if their form may change
             fewer = mesh.decimate_pro(
                 min(share * 1.02, 0.99), feature_angle=FEATURE_ANGLE, preserve_topology=keeps_form,
                 splitting=False, boundary_vertex_deletion=not keeps_form,
@@ -89,12 +89,12 @@ def broken_at_edges(
 ) -> tuple[IntArray, IntArray]:
     """Return the node of each corner point, and triangles of corner points: smooth neighbours share them.
 
-    Corners of triangles at a node are one point where a chain of edges that are not sharp joins the triangles.
+    Corners of triangles at a node are one point if a chain of edges that are not sharp connects the triangles.
 
     Parameters
     ----------
     at_edge
-        Nodes between which an edge may be sharp, (n_nodes,): thinning makes a smooth surface coarse; None: all.
+        Nodes between which an edge may be sharp, (n_nodes,), because thinning roughens smooth surfaces; None: all.
     """
     n = len(triangles)
     ends, beside, is_sharp = surface_edges(nodes, triangles)

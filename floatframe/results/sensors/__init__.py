@@ -116,8 +116,8 @@ def measured(system: System, trajectory: Trajectory, sensors: Sequence[Sensor] |
     names = [body.name for body in system.bodies]
     if names != list(trajectory.body_names):
         raise ModelError(
-            f"measured: the motion has bodies {', '.join(trajectory.body_names)}, but system {system.name!r} "
-            f"{', '.join(names)}; give the system that was run"
+            f"measured: the motion has bodies {', '.join(trajectory.body_names)}, but system {system.name!r} has "
+            f"{', '.join(names)}; give the system of the run"
         )
     return {
         sensor.name: sensor.measure(system, trajectory)

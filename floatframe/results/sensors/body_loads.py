@@ -33,7 +33,7 @@ from floatframe.results.trajectory import Trajectory
 __all__ = ["INTERFACE_AXES", "InterfaceForceSensor", "RecoverySensor", "SpringSensor"]
 
 INTERFACE_AXES = ("ground", "body")
-ROUNDING = 1e-12  #: size relative to the largest wrench below which a value is a rounding error
+ROUNDING = 1e-12  #: magnitude, relative to the largest wrench, below which a value is a rounding error
 
 
 def interface_loads(system: System, trajectory: Trajectory, body: FlexibleBody) -> Array:
@@ -75,13 +75,13 @@ def require_loads(
     Raises
     ------
     ResultsError
-        If the others are not the forces of the system.
+        If the other recorded forces are not the forces of the system.
     """
     own = tuple(force.name for force in system.forces if isinstance(force, kind))
     if names[: len(own)] != own:
         raise ResultsError(
-            f"the motion of {trajectory.head.system!r} is not one of the system {system.name!r}: it was moved by "
-            f"{', '.join(names) or 'no forces'}, expected {', '.join(own)}; give the system that was run"
+            f"the motion of {trajectory.head.system!r} does not belong to the system {system.name!r}: expected the "
+            f"forces {', '.join(own)}, got {', '.join(names) or 'none'}; give the system of the run"
         )
     return list(enumerate(names))[len(own) :]
 
@@ -282,7 +282,7 @@ class RecoverySensor:
 
     y = D_0 z + D_1 z' + D_2 z'' + L p, see `cms.body.recovery_table`. z' and z'' are velocities and
     accelerations of the body frame in its axes and the rates of q. p contains gravity, spin, the loads on interfaces
-    and load cases. Positions are relative to the moving body frame, so z begins with zeros.
+    and load cases. Positions are relative to the moving body frame, so that the first entries of z are zero.
 
     Parameters
     ----------

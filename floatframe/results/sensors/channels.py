@@ -153,7 +153,7 @@ class CoordinateChannel:
         """Return the coordinate or its rate over time; results do not contain second rates of coordinates."""
         if self.rate == 2:
             raise ModelError(
-                f"channel {self.name!r}: a second rate of a joint coordinate is no part of results over time; take "
+                f"channel {self.name!r}: results over time do not contain second rates of joint coordinates; take "
                 'measure = "velocity", or the acceleration of a place'
             )
         found = joint_coordinate(system, trajectory, self.joint, self.coordinate)

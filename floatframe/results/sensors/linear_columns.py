@@ -7,7 +7,7 @@ from floatframe.results.small_motions.rows import LinearColumns, Rows
 
 __all__ = ["NO_SIZE", "scalar_columns", "vector_linear"]
 
-NO_SIZE = "its size has no slope where the vector is zero"
+NO_SIZE = "the magnitude of a zero vector has no derivative"
 
 
 def vector_linear(rows: Rows, value: Array, unit: str, *, prefix: str = "", least: float = 0.0) -> LinearColumns:

@@ -28,7 +28,7 @@ from floatframe.results.trajectory import Energies, Trajectory
 __all__ = ["AXES", "CoordinateSensor", "EnergySensor", "ModeSensor", "MomentumSensor", "ReactionSensor"]
 
 AXES = ("ground", "marker")
-ROUNDING = 1e-12  #: size relative to the largest wrench below which a value is a rounding error
+ROUNDING = 1e-12  #: magnitude, relative to the largest wrench, below which a value is a rounding error
 ENERGIES = (*Energies.__dataclass_fields__, "total", "balance")
 
 
@@ -149,7 +149,7 @@ class CoordinateSensor:
         force = force_rows(small, self.joint, self.coordinate)
         units, columns = dict(self.measure(small.system, small.now).units), {"value": value, "rate": value.rate}
         if force is None:
-            return LinearColumns(columns, units, {"force": "the force along a line that deforms with its place"})
+            return LinearColumns(columns, units, {"force": "the force along a line with variable direction"})
         return scalar_columns(columns | {"force": force}, units)
 
 
@@ -207,7 +207,7 @@ class MomentumSensor:
         """Return momenta about a state of rest: Σ R m v and Σ R j + r × R m v, where M u = (m v, j, ...)."""
         found = self.measure(small.system, small.now)
         if small.is_turning:
-            why = dict.fromkeys(found.columns, "the momentum of a system that turns: linearise it at rest")
+            why = dict.fromkeys(found.columns, "the momentum about a steady rotation: linearise the system at rest")
             return LinearColumns({}, found.units, why)
         x = np.zeros((6, small.n_x))
         masses = linearized(small.compiled.model, small.work, 1.0, 0.0, 0.0).H

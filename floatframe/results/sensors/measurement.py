@@ -28,9 +28,9 @@ class Measurement:
     """Columns over time, by name, such as x, y, z, size: `measurement.x`, `measurement["von Mises"]`."""
 
     sensor: str
-    t: Array  #: (n_t,) [s]
-    columns: Mapping[str, Array]  #: each (n_t,)
-    units: Mapping[str, str]  #: of each column, in the symbols of the system
+    t: Array  #: times, (n_t,) [s]
+    columns: Mapping[str, Array]  #: values of each column, (n_t,)
+    units: Mapping[str, str]  #: unit of each column, in the symbols of the system
     places: tuple[str, ...] = ()  #: descriptions of the measured points, if they depend on the motion
     numbers: tuple[str, ...] = ()  #: columns that number a place (node, instance) and are not quantities over time
 
@@ -39,7 +39,7 @@ class Measurement:
         object.__setattr__(self, "units", FrozenMapping(dict(self.units)))
 
     def summary(self) -> Summary:
-        """Return what `repr` and notebooks show: the times, and the range of each column with its unit."""
+        """Return the content shown by `repr` and notebooks: the times, and the range of each column with its unit."""
         t = f"{len(self.t)}, {self.t[0]:.6g} to {self.t[-1]:.6g}" if len(self.t) else "none"
         table = [
             (name, self.units[name], *((f"{values.min():.6g}", f"{values.max():.6g}") if len(values) else ("", "")))
@@ -107,7 +107,7 @@ class Measurement:
         return f"{self.sensor} {column}".strip()
 
     def channel(self, column: str) -> str:
-        """Return the name of a column among those of all sensors: "sensor column"; a chosen column keeps its name."""
+        """Return the name of a column among all sensors, "sensor column"; a chosen column keeps its name."""
         is_chosen = self.sensor.endswith((f".{column}", f" {column}")) and len(self.columns) == 1
         return self.sensor if is_chosen else f"{self.sensor} {column}"
 
@@ -122,7 +122,7 @@ class Sensor(Protocol):
         """Name of the sensor in its system."""
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
-        """Return what it measures during a motion of the system."""
+        """Return the measurement during a motion of the system."""
 
     def linear(self, small: SmallMotions) -> LinearColumns:
         """Return its columns as linear functions of small motions."""

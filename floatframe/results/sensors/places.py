@@ -47,7 +47,7 @@ __all__ = [
     "small_place",
 ]
 
-ROUNDING_OF_MOTION = 1e-12  #: size relative to the system below which a length or an angle is a rounding error
+ROUNDING_OF_MOTION = 1e-12  #: magnitude, relative to the system, below which a length or an angle is a rounding error
 
 TURNING = ("rotation-vector", "angular-velocity")  #: quantities that describe the axes of a point
 PLACE_QUANTITIES = {
@@ -211,8 +211,8 @@ class PlaceSensor:
         if self.relative_to is None:
             if self.quantity == "rotation-vector" and small.is_turning:
                 raise ModelError(
-                    f"{where}: a rotation vector against the ground is not linear about a steady rotation, which turns "
-                    "it without end; give relative_to a body that turns along"
+                    f"{where}: a rotation vector relative to the ground grows without limit in a steady rotation and "
+                    "is not linear about it; give relative_to = a body that rotates with the system"
                 )
             rows = absolute_rows(small, small_place(small, f"{where}: marker", self.marker), self.quantity)
         else:

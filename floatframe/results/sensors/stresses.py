@@ -27,10 +27,10 @@ from floatframe.results.trajectory import Trajectory
 
 __all__ = ["ElongationSensor", "StrainGauge", "StressSensor", "VonMisesSensor", "address_of"]
 
-UNLOADED = "von Mises' stress has no slope where there is no stress"
+UNLOADED = "the von Mises stress of a zero stress has no derivative"
 #: the von Mises stress is the root of sᵀ P s, s = xx, yy, zz, yz, xz, xy; this is the block of P for xx, yy, zz
 MISES = np.array([[1, -0.5, -0.5], [-0.5, 1, -0.5], [-0.5, -0.5, 1]])
-ROUNDING = 1e-12  #: stress relative to the terms of its sum below which it is a rounding error
+ROUNDING = 1e-12  #: stress, relative to the terms of its sum, below which it is a rounding error
 
 
 def flexible_body(system: System, sensor: str, name: str) -> FlexibleBody:
@@ -53,8 +53,8 @@ def modes_at(
         found = found_at(body, f"sensor {sensor!r}", given, of_stress=True)
         if len(found.rows) > 1:
             raise ModelError(
-                f"sensor {sensor!r}: {found.asked} has stress at {len(found.rows)} points of the surface; name one by "
-                "its position, or a stress point"
+                f"sensor {sensor!r}: {found.asked} has stress at {len(found.rows)} points of the surface; select one "
+                "by its position, or name a stress point"
             )
         return np.asarray(modes[found.rows[0]])
     names = () if reduced.point_stress is None else reduced.point_stress.names
@@ -113,8 +113,8 @@ def von_mises_rows(modes: Array, q: Array, coordinates: Rows) -> Rows | None:
 class StressSensor:
     """Stress at a node or stress point: six components in body axes, and the von Mises stress.
 
-    If several points are meant (an element, a set, the skin around a node of a beam or shell), the one with the largest
-    von Mises stress during the motion is measured.
+    If the place has several points (an element, a set, the skin around a node of a beam or shell), the point with the
+    largest von Mises stress during the motion is measured.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ class StressSensor:
         return Measurement(self.name, trajectory.t, columns, units, places)
 
     def modes_of(self, body: FlexibleBody, trajectory: Trajectory) -> tuple[Array, tuple[str, ...]]:
-        """Return stress modes, (6, n_q), and description of the point; of several points, of the most stressed."""
+        """Return stress modes, (6, n_q), and description of the point; for several points, of the most stressed one."""
         address = address_of(self)
         if address is None:
             return modes_at(body, self.name, None, self.point), ()
@@ -218,8 +218,8 @@ class VonMisesSensor:
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return the largest stress over time and the number of its node in the user's mesh.
 
-        If there are no numbers (an older file), the column is named as the index in the model. If instances have equal
-        numbers, a further column contains the index of the instance.
+        In older files without numbers, the column contains the index in the model. If instances have equal numbers, a
+        further column contains the index of the instance.
         """
         body = flexible_body(system, self.name, self.body)
         reduced, address = body.reduced, address_of(self)
@@ -251,7 +251,7 @@ class VonMisesSensor:
         _, where = largest_von_mises(small.now, self.body, body.reduced, rows=rows)
         modes = np.asarray(stress_modes(self.body, body.reduced)[int(where[0])])
         row = von_mises_rows(modes, small.now.body(self.body).q[0], small.coordinates(self.body))
-        not_linear = {column: "numbers of nodes have no slope" for column in units if column != "largest"}
+        not_linear = {column: "numbers of nodes have no derivative" for column in units if column != "largest"}
         if row is None:
             return LinearColumns({}, units, not_linear | {"largest": UNLOADED})
         return LinearColumns({"largest": row}, units, not_linear)
@@ -338,10 +338,10 @@ class StrainGauge:
 class ElongationSensor:
     """An extensometer: change of distance between two nodes divided by the distance; it needs no stress modes.
 
-    It is of first order, like the strains of the body: e · (u_b - u_a) / |d| along the undeformed line d = |d| e. A
-    local rotation by theta moves b by |d| theta across the line, and back along it by |d| theta²/2. First-order
-    displacements lack the latter part, quadratic modes contain it; the distance of the displaced nodes would count it
-    as strain.
+    It is of first order, like the strains of the body: e · (u_b - u_a) / |d| along the undeformed line d = |d| e. The
+    distance of the displaced nodes is not used: a local rotation by theta moves b by |d| theta normal to the line and
+    by -|d| theta²/2 along it, but first-order displacements lack the second part (only quadratic modes contain it), so
+    that the rotation would count as strain.
 
     Parameters
     ----------
@@ -394,7 +394,9 @@ class ElongationSensor:
         reduced: ReducedBody = body.reduced
         a, b = (each.rows for each in self.ends(body))
         if np.array_equal(a, b):
-            raise ModelError(f"sensor {self.name!r}: both positions are nearest to one node; take them further apart")
+            raise ModelError(
+                f"sensor {self.name!r}: both positions have the same nearest node; move them further apart"
+            )
         by_q = np.asarray(reduced.Phi[b].mean(axis=0) - reduced.Phi[a].mean(axis=0))
         return np.asarray(reduced.nodes[b].mean(axis=0) - reduced.nodes[a].mean(axis=0)), by_q
 

@@ -174,7 +174,7 @@ class SmallMotions:
         x = np.zeros(self.n_x)
         x[: self.n_u] = rows[name]
         for k, base in enumerate(self.bases):
-            if joint in base.moved:  # a motion of both sides does not change it
+            if joint in base.moved:  # a common motion of both sides does not change it
                 x[self.n_u + k] = -rows[name] @ self.rigid(base)
         return self.by_motion(x)
 

@@ -173,7 +173,7 @@ def test_all_missing_names_are_told_with_the_nearest(results, tmp_path, command)
                tmp_path / ("a.png" if command == "plot" else "a.csv"))  # fmt: skip
     assert done.exit_code == 2
     words = " ".join(done.stderr.split())
-    for each in ("did you mean 'box 1'", "no column 'xx'", "'hib*': no sensor, column or coordinate fits"):
+    for each in ("did you mean 'box 1'", "no column 'xx'", "'hib*': no sensor, column or coordinate matches"):
         assert each in words
     assert list(tmp_path.iterdir()) == before
 

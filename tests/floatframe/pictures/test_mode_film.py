@@ -69,7 +69,7 @@ def test_flexible_body_moves_by_frame_and_modes_together():
     with pytest.raises(ModelError, match=f"expected 1 to {number}"):
         mode_scene(system, linear.equilibrium, modes, number + 1, QUARTERS)
     if reduced.stress is None:
-        with pytest.raises(ResultsError, match="holds no stress modes"):
+        with pytest.raises(ResultsError, match="contains no stress modes"):
             mode_scene(system, linear.equilibrium, modes, 1, QUARTERS, color=VON_MISES)
 
 

@@ -115,7 +115,7 @@ def test_stress_is_the_sum_over_the_modes_and_its_largest_is_found(swing):
 
 
 def test_body_without_stress_modes_is_refused(swing):
-    with pytest.raises(ResultsError, match="holds no stress modes"):
+    with pytest.raises(ResultsError, match="contains no stress modes"):
         nodal_stress(swing, "rod", replace(REDUCED, stress=None), 0)
 
 

@@ -157,7 +157,7 @@ def test_elongation_is_the_change_along_the_line(swing):
     change = q @ (REDUCED.Phi[20] - REDUCED.Phi[3]).T
     assert_allclose(found, change @ (b - a) / ((b - a) @ (b - a)), rtol=0, atol=1e-14)
     assert np.abs(found).max() > 1e-3
-    with pytest.raises(ModelError, match="nearest to one node"):
+    with pytest.raises(ModelError, match="have the same nearest node"):
         ElongationSensor("e", "rod", a, a).measure(system, swing)
 
 
@@ -221,7 +221,7 @@ def test_impossible_sensors_are_refused(make, words):
 
 
 def test_motion_of_another_system_is_refused(swing):
-    with pytest.raises(ModelError, match="give the system that was run"):
+    with pytest.raises(ModelError, match="give the system of the run"):
         measured(System([RigidBody("other", 1.0, np.eye(3))]), swing)
 
 
@@ -275,7 +275,7 @@ def test_results_whose_system_file_has_gone_or_changed_are_still_shown(spin, cap
     assert "note: sensors are left out" in result.stderr
     spin.unlink()
     assert "Sensors" not in run("info", results)
-    assert "system file of the run is gone" in run("plot", results, "-s", "tip", code=2)
+    assert "system file of the run does not exist any more" in run("plot", results, "-s", "tip", code=2)
 
 
 @pytest.mark.parametrize(("old", "new", "words"), [

@@ -99,7 +99,7 @@ def test_segments_that_somebody_changed_are_no_motion(tmp_path, monkeypatch):
         read_results(tmp_path / "a.h5")
     folder = interrupted(tmp_path / "b.h5")
     (folder / "000002.h5").write_bytes((folder / "000001.h5").read_bytes())
-    with pytest.raises(ResultsError, match="do not go on"):
+    with pytest.raises(ResultsError, match="do not continue"):
         resume(SYSTEM, tmp_path / "b.h5")
     folder = interrupted(tmp_path / "c.h5")
     data = bytearray((folder / "000001.h5").read_bytes())

@@ -92,7 +92,7 @@ def test_another_system_is_refused(tmp_path):
 
 
 def test_nothing_to_resume_is_said(tmp_path):
-    with pytest.raises(ResultsError, match="no run to this name was begun"):
+    with pytest.raises(ResultsError, match="no run with this name was begun"):
         resume(swing(), tmp_path / "run.h5")
     integrate(swing(), GeneralizedAlpha(0.8), 0.01, H, output=tmp_path / "run.h5")
     with pytest.raises(ResultsError, match="the run is complete"):
