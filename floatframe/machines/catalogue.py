@@ -86,12 +86,12 @@ def machine_files(name: str) -> Sequence[Path]:
 def copy_machine(name: str, folder: str | Path) -> Sequence[Path]:
     """Copy the files of a machine into a folder, which is created; return their paths.
 
-    The folder also gets the schemas that the files name in their first lines; editors complete keys with them.
+    The schemas that the files name in their first lines are copied too; editors complete keys with them.
 
     Raises
     ------
     ModelError
-        If there is no such machine, or one of its files already exists; nothing is written then.
+        If there is no such machine, or one of its files already exists, in which case nothing is written.
     """
     sources, place = machine_files(name), Path(folder)
     origin = Path(__file__).parent / MACHINES[name].room / "files"
@@ -108,7 +108,7 @@ def copy_machine(name: str, folder: str | Path) -> Sequence[Path]:
 
 
 def parameters_of(path: str | Path, changes: Mapping[str, Any] | None = None) -> SimpleNamespace:
-    """Return the values of the parameters of a file as attributes, for formulas beside its motion.
+    """Return the values of the parameters of a file as attributes, for formulas that are compared with its motion.
 
     Parameters
     ----------

@@ -22,11 +22,11 @@ def petal_mesh(
     Parameters
     ----------
     length, width
-        Of the petal [m].
+        Length and width of the petal [m].
     elbow
         Distance from the hinge to the node of the strut [m].
     n_along, n_across
-        Numbers of cells.
+        Numbers of cells along and across the petal.
     """
     n, m = n_along, n_across
     x = np.linspace(0.0, length, n + 1)

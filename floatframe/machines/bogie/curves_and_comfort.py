@@ -64,7 +64,7 @@ def weighted_rms(t: Array, acceleration: Array, direction: str) -> float:
     t
         Times, equally spaced [s], (n,).
     acceleration
-        [m/s²], (n,).
+        Acceleration at these times, (n,) [m/s²].
     direction
         "vertical" or "lateral".
     """

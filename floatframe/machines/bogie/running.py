@@ -103,7 +103,7 @@ def hunting(system: System, radius: float | None = None) -> Hunting:
     """Return the least damped lateral oscillation of a vehicle in steady running, on straight track or a circle."""
     roots, _ = lateral_modes(steady_running(system, radius))
     if not len(roots):
-        raise ModelError("hunting: no oscillation to the side between 0.1 and 15 Hz")
+        raise ModelError("hunting: expected a lateral oscillation between 0.1 and 15 Hz, got none")
     damping = -roots.real / np.abs(roots)
     k = int(np.argmin(damping))
     return Hunting(float(damping[k]), float(roots[k].imag / (2 * np.pi)))

@@ -1,8 +1,8 @@
 """The unstable limit cycle of a hunting vehicle: smaller oscillations die out, larger ones grow.
 
 A vehicle in steady running is displaced in its least damped hunting mode with an amplitude a of one axle, x + a
-Re(phi), u + a Re(lambda phi), and released. The unstable limit cycle lies between an a from which the oscillation dies
-out and one from which it grows; it is found by bisection.
+Re(phi), u + a Re(lambda phi), and released. The amplitude of the unstable limit cycle is between an a from which the
+oscillation dies out and an a from which it grows; it is found by bisection.
 """
 
 from dataclasses import dataclass
@@ -25,7 +25,9 @@ from floatframe.simulation.integrate import integrate
 __all__ = ["Bracket", "Hunted", "Run", "bracket_of_unstable_cycle", "hunted"]
 
 SMALLER = 0.96  #: factor from an amplitude at which a wheel climbs the rail to the next amplitude that is tried
-LASTING = 0.7  #: an oscillation above this fraction of the amplitude of the stable cycle is taken to end on the cycle
+LASTING = (
+    0.7  #: fraction of the amplitude of the stable cycle above which an oscillation is assumed to end on the cycle
+)
 SETTLING = 1.0  #: time after which an oscillation that starts as a mode has settled [s]
 
 
@@ -93,7 +95,7 @@ def hunted(system: System, axle: str) -> Hunted:
     motion = steady_motion_of(system)
     roots, modes = lateral_modes(linearize(motion.system, motion.equilibrium, inputs=(), outputs=()))
     if not len(roots):
-        raise ModelError("hunted: no oscillation to the side between 0.1 and 15 Hz")
+        raise ModelError("hunted: expected a lateral oscillation between 0.1 and 15 Hz, got none")
     root = roots[np.argmax(roots.real / np.abs(roots))]
     shape = modes.shapes[:, np.argmin(np.abs(modes.eigenvalues - root))]
     sizes = [6 + (body.reduced.n_q if isinstance(body, FlexibleBody) else 0) for body in system.bodies]

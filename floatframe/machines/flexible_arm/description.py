@@ -46,7 +46,7 @@ def arm(parts: FlexibleLinks, *, modes: Sequence[int] | None = None, is_rigid: b
     modes
         Numbers of the modes of each link, from zero; None: all.
     is_rigid
-        Whether to leave out all modes.
+        Whether to remove all modes.
     """
     bodies = []
     for name, x in (("upper", 0.0), ("forearm", LENGTH)):

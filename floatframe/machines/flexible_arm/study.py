@@ -95,7 +95,7 @@ def plot_motions(motions: Mapping[str, ArmMotion]) -> "Figure":
         for j, style in enumerate(("-", "--")):
             axes["torque"].plot(t, each.torque[:, j], style, color=color, lw=1.2)
     axes["error"].axvspan(0, DURATION, color="0.93", zorder=0)
-    axes["error"].set(ylabel="tip off its aim [mm]", ylim=(1e-3, 3e3), title=f"A move of {DURATION:g} s (grey)")
+    axes["error"].set(ylabel="error of the tip [mm]", ylim=(1e-3, 3e3), title=f"A move of {DURATION:g} s (grey)")
     axes["error"].legend(loc="lower left")
     for most, style in zip(LARGEST, ("-", "--"), strict=True):
         for sign in (-1, 1):

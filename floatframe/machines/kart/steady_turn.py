@@ -21,7 +21,7 @@ NEUTRAL = 1e-6  #: distance within which an eigenvalue belongs to position, head
 
 
 def steady_turn(system: System, speed: float, *, near: SteadyMotion | None = None) -> SteadyMotion:
-    """Return the turn of a kart after its steering step; curvature and the speed of the rear axle are found.
+    """Return the steady turn of a kart after its steering step, with its curvature and the speed of the rear axle.
 
     Parameters
     ----------

@@ -20,8 +20,8 @@ __all__ = ["Retraction", "critical_speed", "growth", "retraction", "rolling", "r
 # closed forms ---------------------------------------------------------------------------------------------------------
 # Retraction of a gear in its plane, by intersection of circles: knee of the brace, length and force of the jack.
 #
-# The leg rotates by theta about its hinge, the origin, which takes a point (y, z) of it to (y cos theta - z sin theta,
-# y sin theta + z cos theta). The brace connects its hinge on the airframe to a point of the leg, by two links of equal
+# The leg rotates by theta about its hinge, the origin; a point (y, z) of the leg moves to (y cos theta - z sin theta,
+# y sin theta + z cos theta). The brace connects its hinge on the airframe to a point of the leg by two links of equal
 # length with a knee.
 
 
@@ -52,7 +52,7 @@ def retraction(theta: Array) -> Retraction:
     hinge, foot = np.array(BRACE), rotated_point(theta, FOOT)
     between = foot - hinge
     d = np.linalg.norm(between, axis=1, keepdims=True)
-    normal = np.stack([between[:, 1], -between[:, 0]], axis=1) / d  # to the side of the knee, less
+    normal = np.stack([between[:, 1], -between[:, 0]], axis=1) / d  # towards the knee, except for its sign
     knee = hinge + between / 2 - np.sqrt(LINK**2 - (d / 2) ** 2) * normal
     jack = np.linalg.norm(rotated_point(theta, HORN) - np.array(JACK), axis=1)
     centre = rotated_point(theta, LEG_CENTRE)[:, 1]
@@ -74,13 +74,13 @@ def rolling_state(system: System, speed: float, *, body: str = "fuselage") -> St
 # shimmy ---------------------------------------------------------------------------------------------------------------
 
 
-BAND = 0.2, 100.0  #: range of natural frequencies in which shimmy is sought [Hz]
+BAND = 0.2, 100.0  #: range of natural frequencies in which shimmy is searched for [Hz]
 
 
 def rolling(system: System, speed: float, *, body: str = "carriage") -> LinearSystem:
     """Return a gear linearised about straight rolling at a speed [m/s]; `body` keeps its direction.
 
-    Forces that change with time (the blow of shimmy.toml) have their initial value.
+    Forces that change with time (the lateral blow of shimmy.toml) have their initial value.
     """
     about = steady_motion(system, body, speed)
     return linearize(about.system, about.equilibrium, inputs=(), outputs=())
@@ -105,7 +105,7 @@ def critical_speed(system: System, low: float, high: float, *, tolerance: float 
     Raises
     ------
     ModelError
-        If the gear shimmies already at `low`, or not at `high`.
+        If the gear already shimmies at `low`, or does not shimmy at `high`.
     """
     ends = [growth(system, speed).real for speed in (low, high)]
     if not ends[0] < 0 < ends[1]:

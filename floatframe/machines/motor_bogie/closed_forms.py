@@ -89,8 +89,8 @@ def torque_lines(motor: Motor, harmonics: Sequence[Sequence[float]], f: float, s
 def ripple_of_leakage(motor: Motor, f: float, orders: tuple[int, int] = (5, 7)) -> float:
     """Return the usual estimate of the ripple at six times f for a six-step inverter [N m].
 
-    Harmonics are limited by the leakage alone, and the flux is U/w: 3/2 p (U/w) (I_5 - I_7), I_k = U/k / (k w
-    L_leakage).
+    If only the leakage limits the harmonics and the flux is U/w, the ripple is 3/2 p (U/w) (I_5 - I_7) with
+    I_k = U/k / (k w L_leakage).
     """
     w, U = 2 * np.pi * f, supply_voltage(motor, f)
     leakage = motor.stator_leakage + motor.rotor_leakage

@@ -20,7 +20,7 @@ SIX_STEPS = ((-5, 1 / 5), (7, -1 / 7), (-11, -1 / 11), (13, 1 / 13))
 
 @dataclass(frozen=True)
 class MotorBogie:
-    """The numbers of the bogie that its closed forms use; `six_steps.toml` has the same, and all others."""
+    """The numbers of the bogie that its closed forms use; they are equal to those in `six_steps.toml`."""
 
     motor: Motor = field(default_factory=Motor)
     harmonics: Sequence[Sequence[float]] = SIX_STEPS  #: harmonics of the supply voltage

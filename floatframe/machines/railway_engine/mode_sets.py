@@ -86,12 +86,12 @@ def engine_study(
     every: int = 1,
     on_case: Callable[[SetError], None] | None = None,
 ) -> EngineStudy:
-    """Compare mode sets with the full model in the systems of these files, which lie next to carbody.toml and its .h5.
+    """Compare mode sets with the full model in the systems of these files, which are beside carbody.toml and its .h5.
 
     Parameters
     ----------
     files
-        System files from `write_railway_engine`; results are named after them.
+        System files from `write_railway_engine`; results have their names.
     n_modes
         Numbers of vibration modes to compare.
     sets
@@ -113,8 +113,8 @@ def engine_study(
         run = required_run(given, Path(path))
         if not isinstance(run.integrator, GeneralizedAlpha):
             raise ModelError(f"{path}: run: expected scheme = 'generalized-alpha', the scheme of the full model")
-        # plain steps, in which the loads of the full model balance as exactly as the rates of the motion fulfil its
-        # equations
+        # steps without stabilisation, because the loads of the full model are in balance only as exactly as the rates
+        # of the motion satisfy its equations
         plain = replace(run.integrator, stabilized=False)
         loadings[Path(path).stem] = Loading(replace(system, sensors=()), plain, run.t_end, run.h, every)
     loads = engine_loads(next(iter(loadings.values())).system)

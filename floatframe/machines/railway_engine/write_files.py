@@ -31,9 +31,10 @@ __all__ = [
 # wheel paths ----------------------------------------------------------------------------------------------------------
 # Prescribed paths of a wheelset on the rails: a short defect, filtered by the envelope of the wheel, and an S-curve.
 #
-# A wheel of radius R on a rail z(s) has its centre at R + max over x of [z(s + x) - (R - sqrt(R² - x²))]; it cannot
-# follow shapes shorter than its chord. Laterally, the flange touches the rail. The flange is inclined by an angle
-# gamma, and a horizontal cut through it recedes by x² / (2 R tan gamma), like a disc of radius R tan gamma.
+# A wheel of radius R on a rail z(s) has its centre at the height R + max over x of [z(s + x) - (R - sqrt(R² - x²))]; it
+# cannot follow shapes shorter than its chord. Laterally, the flange touches the rail. The flange is inclined by an
+# angle gamma, so that a horizontal section through it recedes by x² / (2 R tan gamma), like a disc of radius R tan
+# gamma.
 
 
 CHANNELS = ("x", "y", "yaw", "roll")  #: of each wheelset, in the order of the columns
@@ -53,7 +54,7 @@ def envelope(rail: Callable[[Array], Array], s: Array, reach: float, radius: flo
     reach
         Distance ahead of and behind the wheel in which the rail is considered, less than the radius [m].
     radius
-        R of the disc [m].
+        Radius R of the disc [m].
     """
     if not 0 < reach <= radius:
         raise ModelError(f"envelope: expected a reach above 0 and at most the radius {radius:g}, got {reach:g}")
@@ -230,7 +231,7 @@ def write_railway_engine(
     Raises
     ------
     ModelError
-        If there is no such case, or the track is of the other case.
+        If there is no such case, or the track belongs to the other case.
     PartError
         If the dimensions are inconsistent.
     """

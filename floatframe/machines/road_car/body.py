@@ -1,4 +1,4 @@
-"""The mesh of the body in white: panels on a frame of thin-walled beams, with nodes for the parts it carries."""
+"""The mesh of the body in white: panels on a frame of thin-walled beams, with nodes for the carried parts."""
 
 import itertools
 from collections.abc import Iterator, Sequence

@@ -32,7 +32,7 @@ def gas(control: RollControl, p: float) -> float:
 
 
 def chambers_at_design(control: RollControl) -> float:
-    """Return the volume of a line beside its gas at design height: two heads, two rod sides, dead volumes [m³]."""
+    """Return the volume of a line without its gas at design height: two heads, two rod sides, dead volumes [m³]."""
     c = control
     swept = c.head_area * c.at_design + c.rod_area * (c.stroke - c.at_design)
     return 2 * (swept + 2 * c.dead_volume) + c.dead_volume
@@ -129,7 +129,8 @@ class CarOnPosts:
 def roll_centre(car: RoadCar, name: str) -> float:
     """Return the height of the roll centre of an axle at design height: y times the slope of the contact path [m].
 
-    The contact moves across by dy when the wheel moves up by dz; a lateral force there lifts the wheel by F dy/dz.
+    The contact moves laterally by dy if the wheel moves up by dz, so that a lateral force F there has the vertical
+    component F dy/dz on the wheel.
     """
     linkage = Linkage(car.axle(name), 1)
     low, high = (linkage.lifted(z) for z in (-1e-4, 1e-4))
@@ -165,7 +166,7 @@ def transfer_shares(
     for name, k in (("front", rate[:2].mean()), ("rear", rate[2:].mean())):
         stiffness[name] = 0.5 * track**2 / (1 / k + 1 / tyre_stiffness)
     lever = sprung_height - sum(part[name] * centre[name] for name in axles)
-    # the weight also leans outwards
+    # the roll moves the weight outwards
     rolling = sum(stiffness.values()) / (sum(stiffness.values()) - sprung * 9.81 * lever)
     found = [
         sprung * (part[name] * centre[name] + rolling * lever * stiffness[name] / sum(stiffness.values()))

@@ -23,19 +23,20 @@ __all__ = ["CarMass", "CarMotion", "SteadyTurn", "body_twist_stiffness", "car_ma
 # The unknowns are lateral velocity v, yaw rate r, and roll phi, lift w and pitch theta (nose down) of the body, at the
 # speed u. For each wheel, at (x, y) from the centre of mass of the car:
 #
-# (1) travel relative to the body z = -(w + y phi - x theta) minus the deflection of the tyre; steer and inclination are
-# those of the linkage at this travel, plus phi for the inclination (2) slip angle atan2(v + r x, u - r y) - steer;
-# lateral force and aligning moment from the tyre (3) load from virtual work on a wheel that moves relative to the body,
-# in axes of the body: contact forces along its path, and weight and inertia of the unsprung mass along that of the
-# wheel centre, balance the force of the post
+# (1) the travel relative to the body is z = -(w + y phi - x theta) minus the deflection of the tyre; steer and
+#     inclination are those of the linkage at this travel, plus phi for the inclination
+# (2) the slip angle is atan2(v + r x, u - r y) - steer; lateral force and aligning moment follow from the tyre
+# (3) the load follows from virtual work on a wheel that moves relative to the body, in axes of the body: contact forces
+#     along the path of the contact, and weight and inertia of the unsprung mass along the path of the wheel centre,
+#     balance the force of the post
 #
 # and for the car: (4) sum F_y = m u r, (5) no moment about z, (6) sum F_z = m g, (7) no moment about x and y. Wheels
-# roll against the moment M_y of their tyres; the rear wheels share the driving force equally, without slip. The
-# rotation of their spin with the car requires a moment about x.
+# roll against the moment M_y of their tyres; the rear wheels share the driving force equally, without slip. The wheels
+# spin and rotate with the car, which requires a gyroscopic moment about x.
 
 
 G, RADIUS = 9.81, 0.302  #: gravity [m/s²], loaded radius of a tyre [m]
-#: from load [N], slip angle and inclination [rad], left or not, to F_y [N], M_x, M_y, M_z [N m] in axes of the contact
+#: function from load [N], slip angle [rad], inclination [rad] and side (left: True) to F_y [N], M_x, M_y, M_z [N m]
 Tyre = Callable[[float, float, float, bool], tuple[float, float, float, float]]
 
 

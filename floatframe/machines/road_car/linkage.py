@@ -113,7 +113,7 @@ class Linkage:
         return np.asarray(foot + np.cos(psi) * e + np.sin(psi) * f)
 
     def _rod_end(self, low: Array, up: Array) -> Array:
-        """Return the rod end by (3): of the two common points of three spheres, that on the side of the design."""
+        """Return the rod end by (3): of the two common points of three spheres, the one on the side of the design."""
         p = self.p
         r = [np.linalg.norm(p["rod_outer"] - p[name]) for name in ("lower_ball", "upper_ball", "rod_inner")]
         u = up - low
@@ -139,7 +139,7 @@ POINTS = (
 
 
 def spring_preload(car: RoadCar, name: str, support: str) -> float:
-    """Return the compression force of a spring at design height [N]; without oil it also carries the oil's part."""
+    """Return the compression force of a spring at design height [N]; without oil it includes the force of the oil."""
     axle, c = car.axle(name), car.control
     if support == "hydraulic":
         return axle.preload

@@ -20,7 +20,7 @@ if __name__ == "__main__":
         told.append(f"{name}: {move.iterations} iterations, cost {move.cost:.4f}, largest torques {largest} N m")
     motions = compared(parts, found)
     for name, each in motions.items():
-        told.append(f"{name}: tip off by up to {1e3 * each.residual:.2f} mm after the move")
+        told.append(f"{name}: error of the tip up to {1e3 * each.residual:.2f} mm after the move")
     (here / "move.txt").write_text("\n".join(told) + "\n")
     plot_motions(motions).savefig(here / "move.png", dpi=110)
     move = found["flexible"]

@@ -1,5 +1,5 @@
 "use strict";
-// Picture, light, ground, and where it is seen from.
+// Picture, light, ground and camera.
 View.stage = function (record, canvas, machine) {
   const renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true, preserveDrawingBuffer: true });
   renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, 2));
@@ -39,12 +39,12 @@ View.stage = function (record, canvas, machine) {
   const ground = record.ground ? groundPlane(record.ground, size, span) : null;
   if (ground) scene.add(ground.grid, ground.shadow);
 
-  function box() {  // eight corners of what is to be seen
+  function box() {  // eight corners of the visible box
     const half = follow.body >= 0 ? new THREE.Vector3(...view.half).addScalar(0.06 * size) : high.clone().sub(low).multiplyScalar(0.5);
     const middle = follow.body >= 0 ? center.clone().add(moved()) : whole;
     return { middle, half };
   }
-  function moved() {  // way of the followed body since the beginning
+  function moved() {  // displacement of the followed body since the start
     const body = machine.bodies[follow.body];
     return body.place.clone().sub(new THREE.Vector3().fromArray(body.r, 0));
   }

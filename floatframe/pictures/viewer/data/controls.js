@@ -118,7 +118,7 @@
   });
   if (!record.colors.length) el("color-label").hidden = true;
 
-  // how much larger deformation is drawn
+  // magnification of the deformation
   const sizes = [...new Set([0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000, 100000, record.magnification])].sort((a, b) => a - b);
   fill("magnify", isModes ? [[0.25, "small"], [1, "medium"], [2, "large"], [4, "huge"]] : sizes.map((v) => [v, v === 0 ? "none" : `${v}\u00d7`]), isModes ? 1 : record.magnification, (v) => {
     state.magnification = Number(v); machine.forgetTrails();
@@ -126,7 +126,7 @@
   if (isModes) state.magnification = 1;
   if (!record.surfaces.length && !isModes) el("magnify-label").hidden = true;
 
-  // what is shown
+  // visible objects
   const g = machine.groups, has = (group) => group.children.length > 0;
   const flags = [
     ["edges", "edges", g.edges.length > 0, true, (on) => g.edges.forEach((each) => { each.visible = on; })],
@@ -180,7 +180,7 @@
     if (act && !(e.key === " " && e.target.tagName === "BUTTON")) { e.preventDefault(); act(); }
   });
 
-  // the address may say how it begins: #t=0.5&view=side&color=von-mises&mode=2
+  // initial values from the address, such as #t=0.5&view=side&color=von-mises&mode=2
   if (asked.has("color") && record.colors.some((each) => each.key === asked.get("color"))) { el("color").value = state.color = asked.get("color"); }
   pause();
   if (isModes) View.choose(Math.min(record.modes.length, Math.max(0, Number(asked.get("mode") || 1))) - 1);

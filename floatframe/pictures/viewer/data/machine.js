@@ -39,7 +39,7 @@ View.machine = function (record, array) {
     }
   }
 
-  // what carries pieces
+  // carriers of pieces
   const carriers = record.carriers.map((each) => {
     const a = each.axes, axes = new THREE.Matrix4().set(a[0], a[1], a[2], 0, a[3], a[4], a[5], 0, a[6], a[7], a[8], 0, 0, 0, 0, 1);
     const group = new THREE.Group();
@@ -231,7 +231,7 @@ View.machine = function (record, array) {
       object.matrixWorldNeedsUpdate = true;
     }
   }
-  function scalars(surface) {  // of a motion: what colours the nodes, in the units of the legend
+  function scalars(surface) {  // for a motion: values that colour the nodes, in units of the legend
     const factor = chosenColor() ? chosenColor().factor : 1;
     if (state.color === "von-mises" && surface.stress) {
       combined(surface.stress, surface.body.amplitude, surface.n_a, surface.tensor);
@@ -273,7 +273,7 @@ View.machine = function (record, array) {
     geometry.attributes.color.needsUpdate = true;
   }
 
-  // a mode has one colour a node: how far it swings, or its stress, by the largest
+  // a mode has one colour per node: its amplitude or its stress, divided by the largest
   function paintMode() {
     const all = [];
     let largest = 0;
@@ -299,7 +299,7 @@ View.machine = function (record, array) {
     for (const [geometry, corner, values] of all) tint(geometry, corner, values, largest || 1);
     state.top = 1;
   }
-  function swing(d, nodes, u) {  // size of move + turn x place + elastic displacement
+  function swing(d, nodes, u) {  // magnitude of move + turn x position + elastic displacement
     const found = new Float32Array(nodes.length / 3);
     for (let j = 0; j < found.length; j++) {
       const x = nodes[3 * j], y = nodes[3 * j + 1], w = nodes[3 * j + 2];
@@ -357,7 +357,7 @@ View.machine = function (record, array) {
     if (state.mode < 0) paint();
     drawTrails();
   }
-  function at(time) {  // row and share of the way to the next
+  function at(time) {  // row, and fraction of the distance to the next row
     let low = 0, high = n - 1;
     while (high - low > 1) { const middle = (low + high) >> 1; if (times[middle] <= time) low = middle; else high = middle; }
     state.k = time >= times[n - 1] ? n - 1 : low;
