@@ -1,4 +1,4 @@
-/* The functions of FMI 2.0 for model exchange and co-simulation, about a unit of unit.h. Its types are declared here. */
+/* The functions of FMI 2.0 for model exchange and co-simulation of a unit of unit.h. Its types are declared here. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -107,7 +107,7 @@ EXPORTED fmi2Status fmi2SetReal(void *c, REFERENCES, const double *value)
     return answer(c, unit_set(UNIT(c), reference, n, value));
 }
 
-/* There are real variables alone. */
+/* All variables are real. */
 #define NO_VARIABLES(NAME, TYPE)                                                                                       \
     EXPORTED fmi2Status NAME(void *c, REFERENCES, TYPE value[])                                                        \
     {                                                                                                                  \

@@ -1,4 +1,4 @@
-/* The functions of FMI 3.0 for model exchange and co-simulation, about a unit of unit.h. Its types are declared here. */
+/* The functions of FMI 3.0 for model exchange and co-simulation of a unit of unit.h. Its types are declared here. */
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -118,7 +118,7 @@ EXPORTED fmi3Status fmi3SetFloat64(void *c, REFERENCES, const double values[], s
     return answer(c, n == n_values ? unit_set(UNIT(c), reference, n, values) : UNIT_UNKNOWN);
 }
 
-/* There are variables of type Float64 alone. */
+/* All variables have the type Float64. */
 #define NO_VARIABLES(TYPE, C_TYPE, C_CONST)                                                                            \
     EXPORTED fmi3Status fmi3Get##TYPE(void *c, REFERENCES, C_TYPE values[], size_t n_values)                           \
     {                                                                                                                  \
@@ -226,7 +226,7 @@ EXPORTED fmi3Status fmi3DeserializeFMUState(void *c, const uint8_t bytes[], size
     return fmi3OK;
 }
 
-/* What it has not */
+/* Functions that the unit does not support */
 #define NO_DERIVATIVE(NAME)                                                                                            \
     EXPORTED fmi3Status NAME(                                                                                          \
         void *c, const uint32_t unknowns[], size_t n_unknown, const uint32_t knowns[], size_t n_known,                 \

@@ -1,8 +1,8 @@
 /*
  * Derivatives from the generated forward dynamics, and steps by the classical Runge-Kutta method of order four.
  *
- * Positions that are no turns change by their rates; Euler parameters p by p (0, omega) / 2. The generated equations
- * want p of length one: they are given p / |p|, and p is brought back to that length after each step.
+ * The derivatives of positions are their rates, except for Euler parameters p, whose derivative is p (0, omega) / 2. The
+ * generated equations need p of length one: they receive p / |p|, and p is normalised after each step.
  */
 #define UNIT_C
 #include "unit.h"
@@ -105,7 +105,7 @@ Outcome unit_set_states(Memory *unit, const double *x, size_t n)
     return UNIT_OK;
 }
 
-/* One communication step, inputs held, in equal steps of at most the longest; the unit stays where it was on failure. */
+/* One communication step with constant inputs, in equal steps of at most the longest step; a failure changes nothing. */
 Outcome unit_step(Memory *unit, double size)
 {
     static const double part[4] = {0.0, 0.5, 0.5, 1.0}, weight[4] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};

@@ -29,13 +29,13 @@ enum {
 };
 
 typedef struct {
-    double value[N_VALUES]; /* all that the unit remembers */
-    int is_fresh;           /* whether the derivatives are those of the other values */
+    double value[N_VALUES]; /* all variables, by value reference */
+    int is_fresh;           /* whether the derivatives belong to the other values */
 } Memory;
 
 typedef enum { UNIT_OK, UNIT_UNKNOWN, UNIT_READ_ONLY, UNIT_NOT_FINITE, UNIT_NO_STEP } Outcome;
 
-extern const char *const unit_words[]; /* of each outcome */
+extern const char *const unit_words[]; /* message of each outcome */
 
 void unit_reset(Memory *unit);
 Outcome unit_get(Memory *unit, const unsigned int *reference, size_t n, double *value);
