@@ -115,7 +115,7 @@ def test_files_have_the_coordinates_that_move_the_loops(form, tmp_path):
 
 def test_what_does_not_move_a_loop_is_refused_by_name(form):
     robot = form.system
-    with pytest.raises(ModelError, match=r"4 of .* move independently: say which .* such as independent = \('turn"):
+    with pytest.raises(ModelError, match=r"4 of .* move independently: name those .* such as independent = \('turn"):
         linear_form(robot)
     with pytest.raises(ModelError, match=r"4 of .* move independently .* got turn/angle, wrist/angle"):
         linear_form(robot, independent=ANGLES[::3])

@@ -301,7 +301,7 @@ def test_the_full_model_is_where_cases_lead(folder, tmp_path):
     (tmp_path / "full.toml").write_text(text + '[reference]\nkind = "full-model"\nmost_dofs = 500\n')
     assert read_laboratory(tmp_path / "full.toml").reference.asked == ff.design.laboratory.FullModel(500)
     (tmp_path / "both.toml").write_text(text + '[reference]\nkind = "full-model"\nn_modes = 5\n')
-    with pytest.raises(ModelError, match='kind "full-model" expected no n_modes'):
+    with pytest.raises(ModelError, match='kind = "full-model": expected no n_modes'):
         read_laboratory(tmp_path / "both.toml")
 
 

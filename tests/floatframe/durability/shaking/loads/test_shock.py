@@ -197,7 +197,7 @@ def test_a_time_too_short_for_a_spectrum_is_refused():
     [
         ({"time": [0, 1, 1], "history": [0, 1, 0]}, "row 3: 1 s after 1 s"),
         ({"time": [0, 1, 2], "history": [0, 1]}, "expected 3 values"),
-        ({"time": [0, 1, 2], "history": [0, np.nan, 1]}, "row 2 is no number"),
+        ({"time": [0, 1, 2], "history": [0, np.nan, 1]}, "row 2: expected a finite number"),
         ({"time": [0, 1, 2]}, "either a history"),
         ({"time": [0], "history": [0]}, "two finite times"),
     ],
