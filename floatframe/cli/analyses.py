@@ -42,11 +42,11 @@ def check_command(
     json: Json = False,
     set_values: SetValues = [],  # noqa: B006
 ) -> None:
-    """What can be known of a system before its run.
+    """Check a system before its run.
 
-    Mobility and redundant constraints, placement, vibrations at the start and the step sizes that follow them,
-    functions of time that the steps miss, modes and stiffening of flexible bodies. Exit code 0: the run can begin
-    (warnings are printed), 1: it would be refused, 2: the file cannot be read.
+    Reported are mobility and redundant constraints, placement, vibrations at the start and the step sizes that resolve
+    them, functions of time that the steps do not resolve, modes and stiffening of flexible bodies. Exit code 0: the
+    run can begin (warnings are printed), 1: it would be refused, 2: the file cannot be read.
 
     Example: floatframe check crane.toml
     """
@@ -135,7 +135,7 @@ def static_command(
             ("", "unit", "value>"),
             [(name, column["unit"], f"{column['value']:.6g}") for name, column in record["sensors"].items()],
         )
-    say(f"{'stable' if is_stable else 'unstable: the least push makes it leave'}; forces out of balance by "
+    say(f"{'stable' if is_stable else 'unstable: the smallest disturbance grows'}; forces out of balance by "
         f"{record['residual']:.1e} of those at work, {record['n_iterations']} iterations")  # fmt: skip
 
 
@@ -296,7 +296,7 @@ def read_in_formulation(path: Path, formulation: str | None, set_values: Sequenc
     tell_left_out(system)
     if system.fmus:
         names = ", ".join(unit.name for unit in system.fmus)
-        typer.echo(f"note: units of other programs (fmus: {names}) act in runs only; they are left out here", err=True)
+        typer.echo(f"note: units of other programs (fmus: {names}) act only in runs; they are ignored here", err=True)
     return system, formulation_of(run) if formulation is None else formulation
 
 

@@ -179,7 +179,9 @@ def compute(name: str, path: Path, run: "Callable[[Callable[[Progress], None]], 
                 trajectory = run(on_progress)
     except KeyboardInterrupt:
         segments = segments_folder(path.resolve())
-        kept = f"the motion so far is in {segments}, which plot, animate and info can read; floatframe resume goes on"
+        kept = (
+            f"the motion so far is in {segments}, which plot, animate and info can read; floatframe resume continues it"
+        )
         print_error(f"interrupted; {kept if segments.is_dir() else 'nothing was written'}")
         raise typer.Exit(INTERRUPTED) from None
     print_run(trajectory)
@@ -225,7 +227,7 @@ def print_run(trajectory: "Trajectory") -> None:
         rows.append(("note", f"this run did not reach its end, {run.get('t_end', 0):.6g} {second}"))
     summary = record["summary"]
     if summary.get("n_rejected"):
-        rows.append(("rejected steps", f"{summary['n_rejected']}, made again, shorter"))
+        rows.append(("rejected steps", f"{summary['n_rejected']}, repeated with shorter steps"))
     if "n_iterations" in summary:
         each = summary["n_iterations"] / max(summary["n_steps"], 1)
         rows.append(("Newton iterations", f"{summary['n_iterations']} ({each:.2f} a step)"))
@@ -244,7 +246,7 @@ def print_run(trajectory: "Trajectory") -> None:
         [(name, *(f"{v:.6g}" for v in pair)) for name, pair in record["energy"].items() if pair and any(pair)],
     )
     for title, is_of_a_frame in (
-        ("What the run says of its steps", False),
+        ("Notes on the steps of the run", False),
         ("Bodies that left the range of their linear frame", True),
     ):
         notes = [note for note in trajectory.validity if note.is_of_a_frame == is_of_a_frame]
@@ -398,12 +400,14 @@ def plot_command(
     try:
         bodies = bodies_of(trajectory)
     except CmsError as error:  # the motion can be plotted without its bodies
-        typer.echo(f"note: elastic displacement is left out: {error}", err=True)
+        typer.echo(f"note: elastic displacement is omitted: {error}", err=True)
         bodies = {}
     system = spectra.known_system(trajectory)
     if sensors:
         if system is None:
-            raise ResultsError("--sensor: the system file of the run is gone, or the run was made in Python")
+            raise ResultsError(
+                "--sensor: the system file of the run does not exist any more, or the run was made in Python"
+            )
         chosen = chosen_measurements(system, trajectory, sensors)
         figure = plot_sensors(chosen, title=system.name, time_symbol=system.units.time_symbol)
     else:

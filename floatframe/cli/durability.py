@@ -92,7 +92,7 @@ def print_fatigue(record: dict[str, Any]) -> None:
         *((f"S-N curve {each['name']}".strip(), sn_words(each["curve"], unit)) for each in record["materials"]),
         ("blocks", ", ".join(f"{each['name']} ({each['repeats']:.6g} times)" for each in record["blocks"])),
         ("nodes and stress points" if n_points else "nodes",
-         f"{record['n_nodes']}, of which {record['n_counted']} counted; the others cannot matter"),
+         f"{record['n_nodes']}, of which {record['n_counted']} counted; the damage of the others is negligible"),
         ("damage", "none" if not record["damage"] else f"{record['damage']:.4g} a programme"),
         ("life", "no end" if record["life"] is None else f"{record['life']:.5g} {record['life_unit']}"),
         *(("note", note) for note in record["notes"]),
@@ -126,19 +126,19 @@ def shake_command(
         list[Path],
         typer.Option("--output", "-o", help="A .html, .pdf or .json file, or a table (.csv, ...); repeatable."),
     ] = [],  # noqa: B006
-    base: Annotated[str | None, typer.Option(help="Of a modal file: the interface on the base.")] = None,
+    base: Annotated[str | None, typer.Option(help="For a modal file: the interface on the base.")] = None,
     q_factor: Annotated[
-        float | None, typer.Option("--Q", help="Of a modal file: amplification of all modes; default 25.")
+        float | None, typer.Option("--Q", help="For a modal file: amplification of all modes; default 25.")
     ] = None,
     sine: Annotated[
-        str | None, typer.Option(help='Of a modal file: level in g, "5:1,100:1" (Hz:g), or a file.')
+        str | None, typer.Option(help='For a modal file: level in g, "5:1,100:1" (Hz:g), or a file.')
     ] = None,
     rate: Annotated[float | None, typer.Option(help="Sweep rate in octaves per minute; none: steady.")] = None,
     random: Annotated[
-        str | None, typer.Option(help='Of a modal file: density in g2/Hz, "20:0.01,2000:0.01", or a file.')
+        str | None, typer.Option(help='For a modal file: density in g2/Hz, "20:0.01,2000:0.01", or a file.')
     ] = None,
     shock: Annotated[
-        str | None, typer.Option(help='Of a modal file: pulse, "half-sine:50:0.011" (g, seconds).')
+        str | None, typer.Option(help='For a modal file: pulse, "half-sine:50:0.011" (g, seconds).')
     ] = None,
     directions: Annotated[str, typer.Option(help="Base directions, each a run of its own.")] = "x,y,z",
     at: Annotated[list[str], typer.Option("--at", help="Interface or node number that is observed; repeatable.")] = [],  # noqa: B006
@@ -168,7 +168,7 @@ def shake_command(
 
         named = [key for key, value in given.items() if value is not None] + ["--at"] * bool(at)
         if named:
-            raise ModelError(f"{', '.join(named)}: of a modal file; {file} says all of it itself")
+            raise ModelError(f"{', '.join(named)}: only for a modal file; {file} contains these settings")
         job = read_shake(file)
     else:
         job = job_of_options(file, base, q_factor, sine, rate, random, shock, directions, at)
@@ -180,7 +180,7 @@ def shake_command(
     if json:
         light, _ = light_record(shake_record(result), "")
         if "curves" in light:
-            light["curves"] = "left out here; -o NAME.json writes them into NAME.npz"
+            light["curves"] = "omitted here; -o NAME.json writes them into NAME.npz"
         typer.echo(dumps(light, indent=1))
     else:
         print_result(result)
@@ -328,13 +328,13 @@ def print_result(result: "ShakeResult") -> None:
             ],
         )
         if len(rows) > SHOWN:
-            say(f"... and {len(rows) - SHOWN} more outputs, in the files written")
+            say(f"... and {len(rows) - SHOWN} more outputs in the written files")
     for run in result.time:
         for name, v, d in zip(run.inputs, run.velocity_left, run.displacement_left, strict=True):
             if math.isnan(v):  # a force
                 continue
             say(
-                f"{run.kind} {run.test}, {name}: the base is left with {v:.5g} "
+                f"{run.kind} {run.test}, {name}: at the end the base has {v:.5g} "
                 f"{model.units.length_symbol}/{model.units.time_symbol} and {d:.5g} {model.units.length_symbol}"
             )
         if run.synthesis is not None:

@@ -18,14 +18,16 @@ __all__ = ["import_command", "print_robot"]
 def import_command(
     robot: Annotated[Path, typer.Argument(help="A description of a robot (.urdf).")],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder to write; default: its name.")] = None,
-    at: Annotated[list[str], typer.Option(help="JOINT=VALUE where it begins, rad or m; may be repeated.")] = [],  # noqa: B006
-    free: Annotated[bool, typer.Option("--free", help="The root link moves freely; else it is the ground.")] = False,
-    keep_fixed: Annotated[
-        bool, typer.Option("--keep-fixed", help="Links fixed to each other stay bodies of their own.")
+    at: Annotated[list[str], typer.Option(help="JOINT=VALUE, an initial value in rad or m; repeatable.")] = [],  # noqa: B006
+    free: Annotated[
+        bool, typer.Option("--free", help="The root link moves freely; otherwise it is fixed to the ground.")
     ] = False,
-    no_stops: Annotated[bool, typer.Option("--no-stops", help="Limits of joints do not act.")] = False,
+    keep_fixed: Annotated[
+        bool, typer.Option("--keep-fixed", help="Links fixed to each other remain separate bodies.")
+    ] = False,
+    no_stops: Annotated[bool, typer.Option("--no-stops", help="Ignore the limits of joints.")] = False,
     gravity: Annotated[float, typer.Option(help="Acceleration of free fall along -z, m/s².")] = 9.81,
-    pictures: Annotated[str, typer.Option(help="What bodies look like: visual, collision or none.")] = "visual",
+    pictures: Annotated[str, typer.Option(help="Shapes of the bodies: visual, collision or none.")] = "visual",
     package: Annotated[list[str], typer.Option(help="NAME=FOLDER of a package of meshes; may be repeated.")] = [],  # noqa: B006
     flexible: Annotated[
         list[str], typer.Option(help="LINK=FILE, a modal file in the place of a link; may be repeated.")
@@ -101,7 +103,7 @@ def print_robot(path: Path, *, as_json: bool) -> None:
         [
             ("name", robot.name),
             ("links", f"{len(robot.links)}, root {robot.root}"),
-            ("joints", f"{len(robot.joints)}, {record['freedoms']} ways to move"),
+            ("joints", f"{len(robot.joints)}, {record['freedoms']} degrees of freedom"),
             ("mass", f"{record['mass']:.6g} kg"),
             *(("note", note) for note in robot.notes),
         ],

@@ -134,8 +134,8 @@ class ExportTarget:
     """A form that `floatframe export` writes; the keyword arguments of `write` are its options."""
 
     write: Callable[..., None]
-    endings: tuple[str, ...]  #: of its files; empty: it writes a folder
-    reads: str  #: what it is made of
+    endings: tuple[str, ...]  #: endings of its files; empty: it writes a folder
+    reads: str  #: kind of file that it is made from
 
 
 def target_of(file: Path, to: str | None, output: Path | None) -> str:
@@ -144,7 +144,7 @@ def target_of(file: Path, to: str | None, output: Path | None) -> str:
     Raises
     ------
     ModelError
-        If there is no such target, it is not made of such a file, or the output does not say which it is.
+        If there is no such target, it is not made from such a file, or the output name does not determine it.
     """
     from fe_models.foundation.words import nearest
     from floatframe.errors import ModelError
@@ -211,7 +211,9 @@ def write_table(file: Path, output: Path | None, ending: str, *, sensors: Sequen
     )
     system = known_system(trajectory)
     if sensors and system is None:
-        raise ResultsError("--sensor: the system file of the run is gone, or the run was made in Python")
+        raise ResultsError(
+            "--sensor: the system file of the run does not exist any more, or the run was made in Python"
+        )
     if system is None or not sensors:
         bodies = bodies_of(trajectory)
         write_outputs([path], table=lambda: motion_table(trajectory, bodies, system))
@@ -274,7 +276,7 @@ def write_robot(file: Path, output: Path | None, *, effort: float | None = None,
     except OSError as error:
         raise UrdfError(f"{path}: cannot be written: {error.strerror}") from error
     for note in made.notes:
-        typer.echo(f"note: left out: {note}", err=True)
+        typer.echo(f"note: omitted: {note}", err=True)
     for each in files:
         say(f"wrote {each}")
 
@@ -335,7 +337,7 @@ def write_code(
     file: Path, output: Path | None, language: str, *, what: Sequence[str] = ("inverse",), name: str | None = None,
     parameters: Sequence[str] = (), json: bool = False,
 ) -> None:  # fmt: skip
-    """Write the equations of a tree as code, which holds the numbers of the system."""
+    """Write the equations of a tree as code, which contains the numbers of the system."""
     from fe_models.foundation.paths import replace_files
     from floatframe.design.generation.generate import generate
     from floatframe.errors import ModelError

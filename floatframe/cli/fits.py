@@ -92,7 +92,7 @@ def identify_command(
                     if better is None:
                         notes = (
                             *notes,
-                            "of other motions within its range, rates and accelerations none excites better",
+                            "no other motion within its range, rates and accelerations excites the parameters better",
                         )
                 except ModelError as error:
                     notes = (*notes, f"no more informative motion was found: {error}")
@@ -136,7 +136,7 @@ def print_estimate(record: dict[str, Any]) -> None:
             "Another motion", ("channel", "misfit>"), [(k, f"{v:.2%}") for k, v in record["validation"].items()]
         )
     if record["without_effect"]:
-        say(f"without effect on what was measured: {', '.join(record['without_effect'])}")
+        say(f"without effect on the measurement: {', '.join(record['without_effect'])}")
     for words in (*record["notes"], *record["warnings"]):
         say(words)
 
@@ -188,7 +188,7 @@ def optimize_command(
     for path in paths:
         if path.suffix.lower() == ".toml" and path.resolve().parent != Path(described.study.system).resolve().parent:
             raise ModelError(
-                f"--output {path}: expected a place beside {described.study.system}, which names files relative to it"
+                f"--output {path}: expected the folder of {described.study.system}, which names files relative to it"
             )
     with stages() as clock, tasks_of(described.workers if workers is None else workers) as tasks:
         if "run" in described.analyses:
@@ -269,8 +269,8 @@ def optimization_record(result: "OptimizationResult") -> dict[str, Any]:
 def best_system(result: "OptimizationResult") -> str:
     """Return the system file with the best values of the parameters.
 
-    Comments and order are kept. Where a value stands in a file that this one extends, or in a repeated table, the
-    resolved file is returned instead.
+    Comments and order are kept. If a value is in a file that this one extends, or in a repeated table, the resolved
+    file is returned instead.
     """
     import tomlkit
 

@@ -136,7 +136,7 @@ def response_command(
 def print_left_out(linear: "LinearSystem") -> None:
     """Print the columns of sensors that are not linear about the steady motion."""
     for name, why in list(linear.left_out.items())[:MOST_LEFT_OUT]:
-        say(f"left out: {name}, not linear here: {why}")
+        say(f"omitted: {name}, not linear here: {why}")
     if len(linear.left_out) > MOST_LEFT_OUT:
         say(f"and {len(linear.left_out) - MOST_LEFT_OUT} more columns that are not linear here")
 

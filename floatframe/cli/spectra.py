@@ -107,7 +107,9 @@ def sensor_signals(trajectory: "Trajectory", names: list[str], rate: float | Non
 
     system = recorded_system(trajectory)
     if system is None:
-        raise ResultsError("the system file of the run is gone, or the run was made in Python: no sensors are known")
+        raise ResultsError(
+            "the system file of the run does not exist any more, or the run was made in Python: no sensors are known"
+        )
     found = chosen_measurements(system, trajectory, names) if names else [*measured(system, trajectory).values()]
     signals = even_signals(signals_of(found, system.units), rate)
     for note in signals.notes:
@@ -124,7 +126,7 @@ def known_system(trajectory: "Trajectory") -> "System | None":
     try:
         return recorded_system(trajectory)
     except (FloatframeError, CmsError) as error:
-        typer.echo(f"note: sensors are left out: {error}", err=True)
+        typer.echo(f"note: sensors are omitted: {error}", err=True)
         return None
 
 

@@ -105,7 +105,7 @@ def print_study(table: "StudyTable") -> None:
     names = table.to_table().heads[:-1]
     print_table("Study", tuple([*names[:n], *(f"{name}>" for name in names[n:])]), rows[:MOST_ROWS])
     if len(rows) > MOST_ROWS:
-        say(f"... and {len(rows) - MOST_ROWS} more points, in the files written")
+        say(f"... and {len(rows) - MOST_ROWS} more points in the written files")
     for row in [row for row in table.rows if row.error][:5]:
         point = ", ".join(
             f"{p.name} = {value_label(v)}" for p, v in zip(table.study.parameters, row.values, strict=True)
@@ -215,8 +215,10 @@ def gradient_command(
         list[str], typer.Option("--parameter", "-p", help="KEY.PATH of a number in the file; repeatable.")
     ] = [],  # noqa: B006
     analysis: Annotated[str, typer.Option(help="run, static, rotation or modes.")] = "run",
-    omega: Annotated[str | None, typer.Option(help='Of rotation: angular velocity "x,y,z", rad per time unit.')] = None,
-    center: Annotated[str, typer.Option(help='Of rotation: a point of the axis, "x,y,z".')] = "0,0,0",
+    omega: Annotated[
+        str | None, typer.Option(help='For rotation: angular velocity "x,y,z", rad per time unit.')
+    ] = None,
+    center: Annotated[str, typer.Option(help='For rotation: a point of the axis, "x,y,z".')] = "0,0,0",
     method: Annotated[str, typer.Option(help="direct or adjoint.")] = "direct",
     output: Annotated[Path | None, typer.Option("--output", "-o", help="A table (.csv, .json, .mat, ...).")] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the result as JSON, for other programs.")] = False,

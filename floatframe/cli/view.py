@@ -27,7 +27,7 @@ def view_command(
         float | None, typer.Option(help="Initial magnification of deformation; default: automatic.")
     ] = None,
     largest: Annotated[float, typer.Option("--largest", help="Size limit of the page [MB].")] = 10.0,
-    rest: Annotated[bool, typer.Option("--rest", help="Of a system file: its equilibrium alone.")] = False,
+    rest: Annotated[bool, typer.Option("--rest", help="For a system file: only its equilibrium.")] = False,
     n_modes: Annotated[int, typer.Option("--modes", "-n", min=1, help="How many modes, by frequency.")] = 20,
     speed: Speed = 0.0,
     axis: Axis = "z",
@@ -54,7 +54,7 @@ def view_command(
 
     require_color(color)
     if file.suffix.lower() in (".npz", ".mat"):
-        raise ResultsError(f"{file}: a state space does not know its bodies; give the system file, which it came from")
+        raise ResultsError(f"{file}: a state space contains no bodies; give the system file from which it was made")
     is_system = file.suffix.lower() == ".toml"
     if rest and not is_system:
         raise ResultsError(f"--rest: {file} is a motion; the equilibrium is that of a system file (.toml)")

@@ -38,7 +38,7 @@ class HostedUnit:
     resources
         Folder with the system file, the modal files it names, and the settings `archive.write_fmu` left there.
     log
-        Takes words of a warning.
+        Function called with the text of each warning.
     """
 
     def __init__(self, resources: str, log: Callable[[str], None]) -> None:
@@ -145,10 +145,10 @@ SCRIPT = "floatframe_unit_fmi{}"
 #: text of the documentation page in an FMU
 PAGE = """<p>The first run compiles code, a minute or less, once for each installation. Its binary is that of
 {package}.</p>
-<p>Time is in seconds. Force inputs are held over a communication step; a drive takes its value, rate and
-acceleration, and follows them without jumps. The motion is that of the system file alone where the communication step
-is a multiple of its step, {step!r} s, and inputs are held. Parameters are set before the initialisation ends.
-States can be kept, restored and serialised.</p>"""
+<p>Time is in seconds. Force inputs are constant over a communication step; a drive takes its value, rate and
+acceleration, and follows them without jumps. The motion is that of the system file alone if the communication step is
+a multiple of its step, {step!r} s, and inputs are constant. Parameters are set before the initialisation ends.
+States can be saved, restored and serialised.</p>"""
 EPOCH = (1980, 1, 1, 0, 0, 0)  #: date of all files in an FMU, so that the same system gives the same bytes
 
 
@@ -182,10 +182,10 @@ def write_fmu(
         Version, 2 or 3.
     inputs, outputs
         Names of inputs (`held_inputs.input_choices`) and of sensors or joint coordinates; None: those of the table
-        [fmu], and without it the tables [inputs.NAME], all constant forces and drives, and all sensors.
+        [fmu], or without this table the tables [inputs.NAME], all constant forces and drives, and all sensors.
     parameters
-        Key paths of the system file by name; None: those of the table [fmu], and without it all numbers of bodies,
-        forces, couplers and gravity.
+        Key paths of the system file by name; None: those of the table [fmu], or without this table all numbers of
+        bodies, forces, couplers and gravity.
 
     Raises
     ------
@@ -331,7 +331,7 @@ def zipped(files: Mapping[str, bytes]) -> bytes:
 
 # the script in the resources of an FMU that its binary loads: a class that hands every call on to a `HostedUnit` ------
 # The binaries are those of PythonFMU (FMI 2.0) and PythonFMU3 (FMI 3.0). They find the class by its line in the script,
-# call its methods, and know states as the Python objects that it gives them.
+# call its methods, and handle states as the Python objects that it returns.
 
 
 UNIT_SCRIPT = '''"""The unit of a floatframe system; written by floatframe, read by the binary of this FMU."""

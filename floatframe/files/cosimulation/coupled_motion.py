@@ -41,12 +41,12 @@ def co_simulate(
 
     Explicit, from t to t + H:
 
-    (1) sensors of the system at t are the inputs of the units, their outputs at t those of the system
-    (2) all take the step with them, held.
+    (1) sensors of the system at t are the inputs of the units, and outputs of the units at t those of the system
+    (2) all take the step with these inputs, which are constant.
 
     Iterated: (1) and (2) as a first guess; then, until no signal changes by more than the tolerance,
 
-    (3) the signals at t + H are read as in (1), all go back to their states at t
+    (3) the signals at t + H are read as in (1), and all return to their states at t
     (4) all take the step with the means of the signals at t and at t + H.
 
     Parameters
@@ -54,17 +54,17 @@ def co_simulate(
     system
         The system, with `fmus`.
     integrator, t_end, h, output, output_every, progress
-        As of `integrate`.
+        As for `integrate`.
     coupling
         Macro-step and scheme; None: explicit, in steps of h.
 
     Raises
     ------
     ModelError
-        If a connection is impossible: no such file, variable, sensor or input, an algebraic loop, a unit that cannot go
-        back in an iteration.
+        If a connection is impossible: no such file, variable, sensor or input, an algebraic loop, or a unit in an
+        iteration that cannot restore its state.
     CosimulationError
-        If a unit fails or the iteration does not converge; it carries the motion so far.
+        If a unit fails or the iteration does not converge; the error contains the motion so far.
     ConvergenceError
         If a step of the system fails; likewise.
     """
@@ -286,6 +286,8 @@ def targets_of(system: System, units: Sequence[ForeignUnit]) -> dict[str, str]:
             if end and not choices[name].is_drive:
                 raise ModelError(f"fmus.{unit.name}: outputs: {output}: {name} is no drive and has no {end[1:]}")
             if target in found:
-                raise ModelError(f"fmus.{unit.name}: outputs: {output}: on {target} another output acts already")
+                raise ModelError(
+                    f"fmus.{unit.name}: outputs: {output}: {target} already has another output as its source"
+                )
             found[target] = name
     return found

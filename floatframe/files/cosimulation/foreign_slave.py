@@ -30,15 +30,15 @@ class ForeignSlave:
     Parameters
     ----------
     unit
-        What it is, and what it is connected with.
+        The unit and its connections.
     seconds
-        Seconds in the unit of time of the caller.
+        Number of seconds in the time unit of the caller.
 
     Raises
     ------
     ModelError
-        If there is no such file, it is no FMU for co-simulation on this machine, or a variable is not there or not what
-        is needed.
+        If there is no such file, it is not an FMU for co-simulation on this machine, or a variable does not exist or
+        has another type or causality.
     CosimulationError
         If it fails to begin.
     """
@@ -194,7 +194,7 @@ class ForeignSlave:
     def close(self) -> None:
         """Terminate the FMU and remove its extracted files.
 
-        After an error it is only freed, after a fatal error it is not called.
+        After an error it is only freed; after a fatal error it is not called any more.
         """
         if self.instance is not None:
             ways = [self.instance.terminate] if self.worst < DISCARD else []
@@ -223,8 +223,8 @@ def logger() -> Any:
 def callbacks() -> Any:
     """Return the callback functions for a unit of version 2.
 
-    FMPy puts texts together in a function of C that knows one logger, the last it was given, and calls it for all units
-    of the process: a logger of one of them would hear the others, and be called when it has gone.
+    FMPy formats messages in a C function that stores only the last logger and calls it for all units of the process.
+    The logger of one unit would receive the messages of the others, and would be called after it has been freed.
     """
     fmpy = extra_module("fmpy", extra="fmi", purpose="units of other programs")
     fmi2 = extra_module("fmpy.fmi2", extra="fmi", purpose="units of other programs")

@@ -1,6 +1,6 @@
 """Inputs of a system that another program sets: force factors, motors and drives, held between communication steps.
 
-Each input is a function of time of one piece in the compiled system, whose numbers a unit writes anew at every
+Each input is a function of time with one piece in the compiled system. A unit writes its coefficients at every
 communication point; nothing is compiled again.
 """
 
@@ -95,7 +95,7 @@ def with_held_inputs(system: System, names: Sequence[str] | None = None) -> tupl
     system
         The system.
     names
-        Inputs, of `input_choices`; None: the tables [inputs.NAME], and all that is constant in the system.
+        Names in `input_choices`; None: the tables [inputs.NAME], and all constant forces and drives of the system.
 
     Raises
     ------

@@ -31,7 +31,7 @@ class BaseUnit(NamedTuple):
 def base_unit(units: Units, words: str) -> BaseUnit | None:
     """Return a unit such as "mm/s²" or "N mm" in SI base units; None if there is none, or FMI cannot express it.
 
-    words: symbols of the system, those to the power of 2 or 3 with ² or ³, parted by spaces; divisors after "/".
+    words: symbols of the system, separated by spaces, with ² or ³ for powers; divisors follow "/".
     """
     force = BaseUnit(units.to_si(mass=1, length=1, time=-2), 1, 1, -2)
     symbols = {
@@ -164,7 +164,7 @@ def attributes(each: Variable) -> dict[str, str]:
 def known_places(variables: Sequence[Variable], each: Variable) -> list[int]:
     """Return the indices of states and inputs with direct feedthrough to an output or derivative.
 
-    Of outputs that feed through without a list of their own these are all inputs of forces, not those of drives.
+    For outputs with feedthrough but without a list of their own, these are all force inputs, but no drive inputs.
     """
     if each.depends_on is not None:
         return [k for k, other in enumerate(variables) if other.name in each.depends_on]

@@ -76,7 +76,8 @@ class UnitState:
 def quintic(begin: Array, end: Array, duration: float) -> Array:
     """Return coefficients c, (6,), of Σ c_k s^k with value, rate, second rate `begin` at s = 0, `end` at s = duration.
 
-    The first three follow from the beginning; with e the end less what they make of it, as (e0, e1 T, e2 T²),
+    The first three follow from the beginning. With the difference e between the end and their contribution to it, as
+    (e0, e1 T, e2 T²),
     c_3 T³ = 10 e0 - 4 e1 T + e2 T²/2,  c_4 T⁴ = -15 e0 + 7 e1 T - e2 T²,  c_5 T⁵ = 6 e0 - 3 e1 T + e2 T²/2.
     """
     T = duration
@@ -105,11 +106,11 @@ def sensor_names(system: System, outputs: Sequence[str] | None) -> list[str]:
 class Unit:
     """A motion that another program controls by inputs, communication steps, outputs, and saved states.
 
-    Force inputs keep their values over a communication step; where one changes, the motion begins anew from the state
-    (as `integrate` does where a force jumps), so that no impulse is lost. A drive is led from where it is to the value,
-    rate and acceleration that its three inputs promise for the end of the step (x + v H + a H²/2, v + a H, a), by a
-    polynomial of degree five: a motion without jumps of the second rate, exact where the inputs are those of x(t) with
-    a constant acceleration. A step depends on the state and the inputs alone, bit for bit.
+    Force inputs are constant over a communication step. If one changes, the integrator restarts from the present state
+    (as `integrate` does at a jump of a force), so that no impulse is lost. A drive moves from its present value to the
+    value, rate and acceleration that its three inputs predict for the end of the step (x + v H + a H²/2, v + a H, a),
+    by a polynomial of degree five: its second rate does not jump, and the motion is exact if the inputs are those of
+    x(t) with constant acceleration. A step depends only on the state and the inputs, bit for bit.
     """
 
     system: System
@@ -132,7 +133,7 @@ class Unit:
             )
         if events_of(self.system):
             raise ModelError(
-                f"system {self.system.name!r}: its table [events] cannot be a part of a co-simulation; leave it out "
+                f"system {self.system.name!r}: its table [events] cannot be a part of a co-simulation; remove it "
                 "and let the master switch"
             )
         stops = [coupler.name for coupler in self.system.couplers if coupler.limits is not None]
@@ -245,7 +246,7 @@ class Unit:
         n = number_of_steps(0.0, size, self.h)
         h, t = size / n, self.t
         assert self.memory is not None
-        if abs(h - self.memory.h) <= ROUNDING * h:  # a rounding of the master's clock is no other step size
+        if abs(h - self.memory.h) <= ROUNDING * h:  # a rounding error of the master's clock is not another step size
             h = float(self.memory.h)
         drives: dict[str, Array] = {}
         for each in self.held:

@@ -30,7 +30,7 @@ class Frame:
 def rpy_of(R: Array) -> Array:
     """Return roll, pitch and yaw, (3,) [rad], for R = R_z(yaw) R_y(pitch) R_x(roll).
 
-    Where the pitch is a right angle, yaw and roll turn about one axis: the roll is zero there.
+    If the pitch is a right angle, yaw and roll rotate about the same axis; the roll is then zero.
     """
     cosine = float(np.hypot(R[0, 0], R[1, 0]))
     pitch = np.arctan2(-R[2, 0], cosine)

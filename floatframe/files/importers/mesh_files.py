@@ -1,8 +1,8 @@
 """Surface files that a robot description names, and their contents.
 
-Names are `package://NAME/rest` (of ROS), `file:///path`, or a path relative to the description. A package is looked for
-where the caller says it is, then in the folders above the description (as NAME/rest, or as the folder NAME itself),
-then in those that ROS_PACKAGE_PATH lists.
+Names are `package://NAME/rest` (of ROS), `file:///path`, or a path relative to the description. A package is searched
+for in the folder that the caller gives, then in the folders above the description (as NAME/rest, or as the folder NAME
+itself), then in the folders in ROS_PACKAGE_PATH.
 """
 
 import os
@@ -30,16 +30,16 @@ def mesh_path(name: str, source: str, packages: Mapping[str, str | os.PathLike[s
     Parameters
     ----------
     name
-        As written.
+        Name as written in the description.
     source
-        Path of the description; "": it has none, and names of its own files are paths.
+        Path of the description; "": the description is not in a file, and names of files are paths.
     packages
         Folders of packages by their names.
 
     Raises
     ------
     UrdfError
-        If there is no such file; with the places where it was looked for.
+        If there is no such file; the message lists the searched paths.
     """
     tried = list(candidates(unquote(name) if "://" in name else name, source, packages or {}))
     for path in tried:
@@ -88,7 +88,7 @@ def mesh_of(mesh: MeshFile, path: Path) -> Mesh:
     Raises
     ------
     UrdfError
-        If the file holds no surface that can be read.
+        If the file contains no readable surface.
     """
     try:
         surface = mesh_file(path)
@@ -96,14 +96,14 @@ def mesh_of(mesh: MeshFile, path: Path) -> Mesh:
         raise UrdfError(str(error)) from None
     if (mesh.scale == 1.0).all():
         return surface
-    is_mirrored = np.prod(mesh.scale) < 0  # outward stays outward
+    is_mirrored = np.prod(mesh.scale) < 0  # keeps normals outward
     return Mesh(surface.nodes * mesh.scale, surface.triangles[:, ::-1] if is_mirrored else surface.triangles)
 
 
 def stl_bytes(nodes: Array, triangles: IntArray) -> bytes:
     """Return a surface as binary STL: 80 bytes, number of triangles, then normal, three corners and two bytes each.
 
-    The format has single precision: coordinates are rounded to some 1e-7 of their size.
+    The format has single precision: coordinates are rounded to about 1e-7 of their magnitude.
     """
     corners = np.asarray(nodes)[np.asarray(triangles)]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

@@ -1,8 +1,8 @@
 """Reading of URDF, the robot description format of ROS, to a `Robot`.
 
-Elements and attributes are those of its specification (docs/robots.md has the table). What it does not name is listed
-in `Robot.notes`; what it names and is not valid is refused with its line. Nothing is completed: a link without
-<inertial> has no mass, and a number that is missing has the default of the specification or is asked for.
+Elements and attributes are those of the specification (docs/robots.md has the table). Other elements are listed in
+`Robot.notes`; invalid elements are refused with their line number. Nothing is added: a link without <inertial> has no
+mass, and a missing number has the default of the specification or is an error.
 """
 
 import os
@@ -36,8 +36,8 @@ __all__ = ["Element", "read_urdf", "read_xml"]
 
 
 # an XML file as a tree whose elements know their line, so that messages can name it -----------------------------------
-# The parser is Python's own (expat). A document type is refused before its content is parsed: descriptions of
-# robots have none, and it could name other files or entities that grow without end.
+# The parser is Python's own (expat). A document type is refused before its content is parsed: descriptions of robots
+# have none, and it could refer to other files, or to entities that expand without limit.
 
 
 MOST_BYTES = 50_000_000  #: largest size of a file in bytes; a robot with hundreds of links has about 100 kB
@@ -64,7 +64,7 @@ def read_xml(path: Path, root: str) -> Element:
     Raises
     ------
     UrdfError
-        If there is no such file, it is no well-formed XML, too large, or its first element is another.
+        If there is no such file, it is not well-formed XML, it is too large, or its first element has another tag.
     """
     try:
         size = path.stat().st_size
@@ -97,7 +97,7 @@ def parsed(path: Path, content: bytes) -> Element:
     def doctype(name: str, *_: object) -> None:
         raise UrdfError(
             f"{path}, line {parser.CurrentLineNumber}: expected no document type, got <!DOCTYPE {quoted(name)}>; "
-            "take it out"
+            "remove it"
         )
 
     parser.StartElementHandler = begin
@@ -141,7 +141,7 @@ def read_urdf(path: str | os.PathLike[str]) -> Robot:
     Raises
     ------
     UrdfError
-        If it is not valid, or a xacro file that has not been expanded; with the line.
+        If the file is not valid, or is a xacro file that must be expanded first; the message has the line number.
     """
     return Reader(Path(path)).robot()
 
@@ -289,7 +289,7 @@ class Reader:
             elif color is None and not material.all("texture"):
                 raise self.error(material, f"there is no material {quoted(name)} with a color in this file")
             if color is not None and name:
-                self.colors.setdefault(name, color)  # as other readers do: it may be used again below
+                self.colors.setdefault(name, color)  # as in other readers: it may be used again below
         return Picture(self.geometry(shapes[0]), self.pose(element), color, element.attributes.get("name", ""))
 
     def geometry(self, element: Element) -> Box | Cylinder | Sphere | MeshFile:

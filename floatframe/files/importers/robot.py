@@ -1,7 +1,7 @@
 """A robot as described by URDF: a checked tree of links and joints, in the terms of the file.
 
-A link has one frame; the frame of a joint stands at `pose` in that of its parent link, and is that of its child link
-where the joint is at zero. Lengths are in m, masses in kg, angles in rad.
+A link has one frame. The frame of a joint is at `pose` in the frame of its parent link, and coincides with the frame of
+its child link if the joint is at zero. Lengths are in m, masses in kg, angles in rad.
 """
 
 from collections.abc import Sequence
@@ -165,15 +165,15 @@ class Robot:
     joints
         The joints between the links.
     source
-        Path of its file, "": made in Python.
+        Path of its file; "": the robot was made in Python.
     notes
         Elements of the file that are not read.
 
     Raises
     ------
     UrdfError
-        If a name is used twice, a joint names a link that does not exist, a link has two parents, the links are no
-        tree with one root, a limit or a joint that is followed is impossible. Masses are judged where bodies are made.
+        If a name is used twice, a joint names a link that does not exist, a link has two parents, the links are not a
+        tree with one root, or a limit or a followed joint is impossible. Masses are checked when bodies are made.
     """
 
     name: str
@@ -214,7 +214,7 @@ class Robot:
                 raise UrdfError(f"{where}: {what}: there is no link {quoted(name)}{nearest(name, self.by_link)}")
         lower, upper = joint.limits.lower, joint.limits.upper
         if lower is not None and upper is not None and lower > upper:
-            raise UrdfError(f"{where}: limits: expected lower up to upper, got {lower:g} and {upper:g}")
+            raise UrdfError(f"{where}: limits: expected lower <= upper, got {lower:g} and {upper:g}")
         for what in ("effort", "velocity"):
             value = getattr(joint.limits, what)
             if value is not None and value < 0:
@@ -259,11 +259,11 @@ class Robot:
         roots = [link.name for link in self.links if link.name not in parent]
         if len(roots) != 1:
             told = shortened(", ".join(map(repr, roots))) or "none: its joints form a ring"
-            raise UrdfError(f"{self.where()}: expected one link that is no child, the root, got {told}")
+            raise UrdfError(f"{self.where()}: expected one link that is not a child, the root, got {told}")
         if len(self.order) != len(self.links):
             left = sorted(set(self.by_link) - set(self.order))
             raise UrdfError(
-                f"{self.where()}: no way leads from the root {roots[0]!r} to {shortened(', '.join(map(repr, left)))}: "
+                f"{self.where()}: no joints connect the root {roots[0]!r} to {shortened(', '.join(map(repr, left)))}: "
                 "their joints form a ring"
             )
 

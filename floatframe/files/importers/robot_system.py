@@ -1,17 +1,17 @@
 """A robot as a system: links as bodies, in the requested configuration.
 
-(1) links without mass, and links that are fixed to another, become places on the body that carries them; masses of
-    fixed ones are added to it (`combined`), unless they are to stay bodies
-(2) the root stands on the ground, or is a free body
+(1) links without mass, and links that are fixed to another link, become places on the body that carries them; masses of
+    fixed links are added to this body (`combined`), unless they shall remain separate bodies
+(2) the root is fixed to the ground, or is a free body
 (3) bodies are placed by the configuration: link after link from the root,
         T_child = T_parent T_origin T_joint(value)
-(4) a joint stands at a marker with the axes of its frame on both bodies. An angle of a system is zero as placed, a
-    distance is one, so that
+(4) a joint is at a marker with the axes of its frame on both bodies. An angle of a system is zero as placed, but a
+    distance is not, so that
 
         value of the robot = value at the start + angle of the system, or = distance of the system
 
-(5) limits become stops (couplers with limits), damping and friction joint forces, a joint that follows another a
-    coupler
+(5) limits become stops (couplers with limits), damping and friction become joint forces, and a joint that follows
+    another becomes a coupler
 """
 
 import os
@@ -57,8 +57,8 @@ PLACE = 1e-3  #: largest distance of an interface from its joint, relative to th
 class FlexibleLink:
     """A reduced body that replaces a link.
 
-    Its mass and inertia take the place of those of the description, and the joints of the link stand at its
-    interfaces. The position of an interface must be that of its joint; its triad may be any.
+    Its mass and inertia replace those of the description, and the joints of the link are at its interfaces. An
+    interface must have the position of its joint; its triad is arbitrary.
 
     Parameters
     ----------
@@ -110,14 +110,14 @@ class RobotSystem:
         Raises
         ------
         UrdfError
-            If there is no such link, or it is flexible, where only interfaces are places.
+            If there is no such link, or it is flexible: only interfaces are places on a flexible link.
         """
         self.robot.link(link)
         body, frame = self.carriers[link]
         if body in self.interfaces:
             names = ", ".join(dict.fromkeys(self.interfaces[body].values()))
             raise UrdfError(
-                f"robot {self.robot.name!r}: link {link!r} is flexible, so that its frame is no place on it; its "
+                f"robot {self.robot.name!r}: link {link!r} is flexible, so that its frame is not a place on it; its "
                 f"interfaces are: {names}"
             )
         return Marker(body, position=frame.x, triad=frame.R)
@@ -167,34 +167,34 @@ def robot_system(
     robot
         The description.
     configuration
-        Values of joints as placed, by name [rad or m]; default: zero, and what joints that follow others have then.
+        Values of joints as placed, by name [rad or m]; default: zero, and the resulting values of following joints.
     rates
-        Speeds of joints at the start, by name [rad/s or m/s]; default: zero, and what joints that follow others have.
+        Initial speeds of joints, by name [rad/s or m/s]; default: zero, and the resulting speeds of following joints.
     motions
-        Drives of joints, by name, in values of the robot; joints that follow others cannot be driven. Where neither
-        value nor rate at the start is given, those of the motion at t = 0 hold. A driven joint has no stop and no drag.
+        Drives of joints, by name, in values of the robot; joints that follow others cannot be driven. The initial value
+        and rate are those of the motion at t = 0 if neither is given. A driven joint has no stop and no drag.
     is_free
-        Whether the root link moves freely; else it stands on the ground, and its mass does not count.
+        Whether the root link moves freely; otherwise it is fixed to the ground, and its mass has no effect.
     position, rotation_vector
-        Of the root link in the ground, (3,) each [m, rad].
+        Position and rotation vector of the root link in ground axes, (3,) each [m, rad].
     gravity
         Acceleration of free fall, ground axes, (3,) [m/s²]; URDF has none.
     flexible
-        Reduced bodies in the place of links, by name of the link.
+        Reduced bodies that replace links, by name of the link.
     merge_fixed
-        Whether links that are fixed to another are one body with it; else each that has mass is a body of its own.
+        Whether links that are fixed to each other are one body; otherwise each link with mass is a separate body.
     stops
         Whether limits of joints act as stops.
     pictures
-        What bodies look like: "visual", "collision" or "none".
+        Shapes of the bodies: "visual", "collision" or "none".
     packages
-        Folders of packages of ROS that the names of meshes begin with, by name.
+        Folders of the ROS packages in the names of meshes, by name of the package.
 
     Raises
     ------
     UrdfError
-        If a body that moves has no mass, a tensor of inertia is impossible, a value lies beyond limits that are to
-        act, a mesh is not found, or an interface of a flexible link is not where its joint is.
+        If a moving body has no mass, an inertia tensor is impossible, a value is beyond active limits, a mesh is not
+        found, or an interface of a flexible link is not at its joint.
     """
     if pictures not in ("visual", "collision", "none"):
         raise UrdfError(f"pictures: expected visual, collision or none, got {quoted(pictures)}")

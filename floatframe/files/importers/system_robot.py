@@ -1,11 +1,11 @@
 """A system as a robot: a tree of rigid bodies that URDF can represent.
 
 (1) the tree: from the ground (or the only free body) along the joints; a joint that closes a loop is refused
-(2) the frame of a link stands at the marker of the joint that carries it, since that of a joint and of its child link
-    are one in URDF; masses and pictures are turned into it
-(3) with T(value) the motion of a joint and the link placed at T in its parent, the pose of the joint is T T(value)⁻¹
-(4) damping and friction of joint forces, stops and couplers of two joints are written with their joints; what URDF
-    cannot say is listed
+(2) the frame of a link is at the marker of the joint that carries it, because in URDF a joint and its child link have
+    the same frame; masses and pictures are transformed to this frame
+(3) with the motion T(value) of a joint and the link placed at T in its parent, the pose of the joint is T T(value)⁻¹
+(4) damping and friction of joint forces, stops and couplers of two joints are written with their joints; parts that
+    URDF cannot represent are listed
 """
 
 import os
@@ -74,12 +74,12 @@ def robot_of_system(
     Parameters
     ----------
     system
-        Of rigid bodies, in m, kg and s.
+        System of rigid bodies, in m, kg and s.
     values
-        Of joints as placed, by name: where they are zero in the description; default: all are zero as placed.
+        Joint values in the placed configuration, by name; default: all are zero as placed.
     limits
-        Of joints, by name; those of stops of the system need not be given. URDF asks for all four of a joint that
-        turns or slides between limits.
+        Limits of joints, by name; limits that stops of the system define may be omitted. URDF requires all four
+        limits of a revolute or prismatic joint.
 
     Raises
     ------
@@ -136,7 +136,7 @@ class Exporter:
         self.frames[root] = Frame()
         self.follow(root)
         for name in self.bodies:
-            if name not in self.frames:  # no joint holds it
+            if name not in self.frames:  # no joint carries it
                 at = self.at(name)
                 self.frames[name] = Frame()
                 self.made.append(RobotJoint(f"{name} floating", "floating", root, name, pose_of(at)))
@@ -369,7 +369,7 @@ def write_urdf(robot: Robot, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     UrdfError
-        If the file cannot be written, or a limit that URDF asks for is not known.
+        If the file cannot be written, or a limit that URDF requires is unknown.
     """
     text = urdf_text(robot)
     try:

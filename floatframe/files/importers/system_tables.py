@@ -108,7 +108,7 @@ class Writer:
 
 def marker_keys(side: str, marker: Any) -> dict[str, Any]:
     """Return the keys for a marker."""
-    assert isinstance(marker, Marker)  # a robot has no joint without
+    assert isinstance(marker, Marker)  # joints of a robot always have markers
     keys: dict[str, Any] = {f"body_{side}": body_name(marker.body)}
     if marker.interface is not None:
         keys[f"marker_{side}"] = marker.interface

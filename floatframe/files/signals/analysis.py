@@ -94,7 +94,7 @@ def signals_of(measurements: Sequence[Measurement], units: Units) -> Signals:
         (one.channel(name), values, one.units[name]) for one in measurements for name, values in one.quantities.items()
     ]
     if not columns or not len(measurements[0].t):
-        raise SignalError("signals: no sensor has measured anything; name one, or a joint coordinate")
+        raise SignalError("signals: expected a measurement, got none; name a sensor or a joint coordinate")
     names, values, words = zip(*columns, strict=True)
     return Signals(measurements[0].t * units.time, np.column_stack(values), names, words)
 
@@ -102,8 +102,7 @@ def signals_of(measurements: Sequence[Measurement], units: Units) -> Signals:
 def even_signals(signals: Signals, rate: float | None = None) -> Signals:
     """Return channels at equidistant times, unchanged or resampled to a rate; default: the rate of the usual step.
 
-    Rows that events put between the others are so left out, and steps that followed the motion made even; the notes
-    say it.
+    This removes rows that events added between the others, and makes steps of a step-size control equal, with a note.
     """
     if rate is None and equidistant_step(signals.time) is not None:
         return signals
@@ -222,7 +221,7 @@ def spectra_of(
     Raises
     ------
     SignalError
-        If the kind is unknown, or a channel does not bear it.
+        If the kind is unknown, or a channel does not support it.
     """
     if kind not in SPECTRA:
         raise SignalError(f"spectrum {quoted(kind)}: unknown{nearest(kind, SPECTRA)}")

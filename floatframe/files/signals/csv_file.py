@@ -36,14 +36,14 @@ class RawTable:
 def read_csv(path: Path, *, decimal: str | None = None, delimiter: str | None = None) -> RawTable:
     """Return the columns of a text table.
 
-    Without `decimal` and `delimiter` both are taken from the lines that hold numbers; a file that could be read in two
-    ways is refused. The head is what stands before the first line of numbers: names with units in brackets, "acc
-    [m/s^2]" or "acc (g)", or names on one line and units on the next. Lines that begin with # or % are left out.
+    Without `decimal` and `delimiter`, both are determined from the lines with numbers; an ambiguous file is refused.
+    The head consists of the lines before the first line of numbers: names with units in brackets, "acc [m/s^2]" or "acc
+    (g)", or names on one line and units on the next. Lines that begin with # or % are skipped.
 
     Raises
     ------
     SignalError
-        With the line, if rows have different numbers of fields, or a field is no number.
+        If rows have different numbers of fields, or a field is not a number; the message has the line number.
     """
     text, notes = decoded(path)
     rows = [
@@ -82,7 +82,7 @@ def decoded(path: Path) -> tuple[str, list[str]]:
     """Return the text of a file, and notes if its encoding is not UTF-8."""
     content = path.read_bytes()
     if b"\0" in content[:4096] and not content.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise SignalError(f"{path}: expected a text table, got bytes that are none; is it in another format?")
+        raise SignalError(f"{path}: expected a text table, got binary data; is it in another format?")
     for encoding in ("utf-16",) if content.startswith((b"\xff\xfe", b"\xfe\xff")) else ("utf-8-sig", "cp1252"):
         try:
             return content.decode(encoding), [] if encoding == "utf-8-sig" else [f"text in {encoding}"]

@@ -1,7 +1,7 @@
 """Double integration of measured accelerations to motions, with removal of drift.
 
-The acceleration is straight lines a(t) between samples (`floatframe.model.functions.tables.acceleration_table`). What
-is taken off is again straight lines at the same samples, so that the integral stays exact.
+The acceleration a(t) is linear between samples (`floatframe.model.functions.tables.acceleration_table`). The removed
+part is linear between the same samples, so that the integral remains exact.
 """
 
 from collections.abc import Callable
@@ -74,12 +74,12 @@ def without_drift(signal: Signal, drift: str, corner: float | None = None) -> Si
         "none", "mean" (velocity ends as it began), "baseline" (straight line: velocity and position end as they began),
         "high-pass".
     corner
-        Of the high-pass [Hz].
+        Corner frequency of the high-pass [Hz].
 
     Raises
     ------
     SignalError
-        If the signal is no acceleration, or the way is unknown.
+        If the signal is not an acceleration, or the method is unknown.
     """
     unit = parsed_unit(signal.unit)
     if unit is None or unit.quantity not in QUANTITIES:
@@ -108,16 +108,16 @@ def integrated_twice(
     Parameters
     ----------
     signal
-        Acceleration, in the unit of the position over s².
+        Acceleration, in the unit of the position divided by s².
     position, velocity
-        At its first sample.
+        Position and velocity at the first sample.
     drift, corner
-        As of `without_drift`.
+        As for `without_drift`.
 
     Returns
     -------
     TimeFunction
-        Its second derivative is the signal less its drift, at the samples and on straight lines between them.
+        Its second derivative is the signal without its drift, at the samples and linearly between them.
     """
     steady = without_drift(signal, drift, corner)
     motion = acceleration_table(steady.time, steady.values, position, velocity)

@@ -18,11 +18,12 @@ __all__ = ["read_mat", "sound_variables"]
 
 
 # mat elements ---------------------------------------------------------------------------------------------------------
-# The elements of a MATLAB file of version 5, walked through before a reader takes it: tags, sizes and dimensions fit.
+# Check of the elements of a MATLAB file of version 5 before it is read: tags, sizes and dimensions must be consistent.
 #
-# SciPy's reader trusts the contents of a damaged file, and can crash the program. A file is a head of 128 bytes and
-# elements: a tag (type and size of 4 bytes each, or of 2 in a small element) and data, filled up to 8 bytes. An array
-# is an element of elements: flags with its class, dimensions, name, and numbers, or the arrays of its fields or cells.
+# SciPy's reader does not check the contents of a damaged file, and can crash the program. A file consists of a head of
+# 128 bytes and elements: a tag (type and size with 4 bytes each, or 2 in a small element) and data, padded to 8 bytes.
+# An array is an element that contains elements: flags with its class, dimensions, name, and numbers, or the arrays of
+# its fields or cells.
 
 
 NUMBERS = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8}  #: number of bytes of a number by type
@@ -152,14 +153,14 @@ TIME_WORDS = ("t", "time", "times", "zeit")
 def read_mat(path: Path, *, time: str | None = None, rate: float | None = None) -> RawTable:
     """Return the vectors of a MATLAB file with the length of its times, as columns.
 
-    A vector is a column under its name, a table (n_t, k) the columns "name 1", "name 2", ...; fields of structures are
-    called "structure.field", and values beside a text `label` by that. Units are texts: `unit` or `units` in the
-    structure, or a variable NAME_unit. What has another length is left out, and said.
+    A vector is a column with its name; a table (n_t, k) gives the columns "name 1", "name 2", .... Fields of structures
+    are called "structure.field", or by the text in the field `label` of their structure. Units are texts: `unit` or
+    `units` in the structure, or a variable NAME_unit. Vectors of another length are omitted, with a note.
 
     Raises
     ------
     SignalError
-        If it is no MATLAB file or damaged, the time is not in it, or a vector is complex.
+        If the file is damaged or not a MATLAB file, it does not contain the time, or a vector is complex.
     """
     with path.open("rb") as file:
         head = file.read(520)

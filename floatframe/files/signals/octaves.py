@@ -18,7 +18,7 @@ def band_edges(fraction: int, low: float, high: float) -> tuple[Array, Array]:
     """Return midband frequencies, (n,), and edges, (n, 2) [Hz], of the 1/fraction-octave bands between two frequencies.
 
     f_m = 1000 Hz G^(x/b) for odd b = fraction, 1000 Hz G^((2x + 1)/(2b)) for even; edges f_m G^(-1/(2b)) and
-    f_m G^(1/(2b)). Bands lie within low and high as a whole.
+    f_m G^(1/(2b)). Only bands that are completely between low and high are returned.
     """
     if fraction < 1 or not 0 < low < high:
         raise SignalError(
@@ -42,14 +42,14 @@ def nominal_frequency(middle: float) -> float:
 def octave_levels(density: Spectrum, fraction: int = 1) -> Spectrum:
     """Return rms levels in 1/fraction-octave bands from a power spectral density.
 
-    The density is constant about each line, over the resolution; a band takes of each line the part that lies in it, so
-    that the squares of the levels add to the mean square in all bands. Bands narrower than two lines are left out, and
-    those that reach beyond half the rate.
+    The density is constant about each line, over the resolution. A band contains the part of each line that is within
+    its edges, so that the sum of the squared levels is the mean square in all bands. Bands that are narrower than two
+    lines or extend beyond half the rate are omitted.
 
     Parameters
     ----------
     density
-        From `psd`.
+        Density from `psd`.
     fraction
         1: octaves, 3: third octaves.
 

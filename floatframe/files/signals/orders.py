@@ -1,9 +1,9 @@
 """Order tracking: spectra over orders of a rotation with varying speed, from samples at equal angles.
 
 (1) The angle θ(t) of the rotation is known at the samples, or is the integral of its speed.
-(2) Between the samples both are quintic splines: times t_j with θ(t_j) = θ_0 + 2 pi j/S by Newton's method, signal
-    x(t_j). S samples a turn, so many that even at the slowest speed n_min [turns a second] S n_min is the rate of the
-    signal: nothing of it is mirrored to lower orders.
+(2) Between the samples, angle and signal are quintic splines. Newton's method gives the times t_j with
+    θ(t_j) = θ_0 + 2 pi j/S, and the signal is evaluated as x(t_j). The number S of samples per turn is so large that
+    even at the slowest speed n_min [turns per second] S n_min is the rate of the signal, so that there is no aliasing.
 (3) Blocks of whole turns are transformed; the line k of a block of R turns is the order k/R.
 
 A line of order o whose speed changes stays one line, where over frequency it is smeared (Fyfe & Munck (1997)).
@@ -75,19 +75,19 @@ def order_map(
     Parameters
     ----------
     signal
-        At equidistant times.
+        Signal at equidistant times.
     angle
-        Of the rotation at its times, (n_t,) [rad], with all turns; see `angle_of_speed`.
+        Angle of the rotation at these times, (n_t,) [rad], with all turns; see `angle_of_speed`.
     max_order
         Highest order shown.
     resolution
-        Distance of orders; a block has 1/resolution turns.
+        Spacing of orders; a block has 1/resolution turns.
     overlap
-        Part of a block that the next one shares.
+        Fraction of a block that it shares with the next one.
     window, is_rms
-        As of `amplitude_spectrum`.
+        As for `amplitude_spectrum`.
     slowest
-        Speed below which the rotation is left out [rad/s]; by default 5 % of the highest one.
+        Speed below which the rotation is excluded [rad/s]; default: 5 % of the highest speed.
 
     Raises
     ------
@@ -127,7 +127,7 @@ def order_map(
     if turns * per_turn > MOST_SAMPLES:
         raise SignalError(
             f"{where}: {turns:.4g} turns with {per_turn} samples each, for the slowest speed {slow * 2 * np.pi:.4g} "
-            f"rad/s, are more than {MOST_SAMPLES:.0e}; leave slow speeds out (slowest)"
+            f"rad/s, are more than {MOST_SAMPLES:.0e}; exclude slow speeds (slowest)"
         )
     if max_order * fast > rate / 2:
         notes.append(f"orders above {rate / 2 / fast:.4g} lie above half the rate at the highest speed")

@@ -44,21 +44,21 @@ def read_signals(
     path
         The file.
     time
-        Name of the column with the times; by default the first one of a text table, and in a .mat file what is called
-        t or time. Times in other units than seconds are converted by the unit in their head.
+        Name of the column with the times; default: the first column of a text table, or the variable t or time of a
+        .mat file. Times in other units than seconds are converted according to the unit in their head.
     rate
-        Samples a second [Hz] of a file without times; all its columns are channels then.
+        Samples per second [Hz] of a file without times; all its columns are then channels.
     fill
         Longest gap that is filled by interpolation [s]: missing samples, fields without numbers.
     uneven
-        Let times with steps of a few sizes stand, which otherwise are taken for a fault of the record.
+        Whether times with steps of a few sizes are accepted; otherwise they count as an error of the record.
     decimal, delimiter
-        Of text tables, "." or ",", and what stands between columns; by default found from the file.
+        Decimal sign, "." or ",", and delimiter between columns of text tables; default: determined from the file.
 
     Raises
     ------
     SignalError
-        If the file is not what its suffix says, is damaged, or has gaps; with line or place.
+        If the file does not have the format of its suffix, is damaged, or has gaps; the message has the location.
     """
     path = Path(path)
     if is_stream(path):
@@ -163,22 +163,22 @@ def without_gaps(
     Parameters
     ----------
     time
-        (n_t,) [s], as read; NaN where it is missing.
+        Times as read, (n_t,) [s]; NaN if missing.
     values
-        (n_t, n_channels), NaN where a sample is missing.
+        Samples, (n_t, n_channels); NaN if missing.
     names
-        Of the channels.
+        Names of the channels.
     place
-        Words for the place of sample k in the file, such as "road.csv, line 17".
+        Function from k to the location of sample k in the file as text, such as "road.csv, line 17".
     fill
         Longest gap that is filled by a monotone cubic (PCHIP) between the samples beside it [s].
     uneven
-        Let steps of several sizes stand.
+        Whether steps of several sizes are accepted.
 
     Raises
     ------
     SignalError
-        For the first gap that is longer, with its place.
+        If a gap is longer; the message has the location of the first one.
     """
     time, values = np.array(time, dtype=float), np.array(values, dtype=float)
     require_rising(time, place)

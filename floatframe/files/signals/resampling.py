@@ -65,20 +65,20 @@ def accelerations(signal: Signal) -> tuple[Array, str]:
 def resampled(signal: Signal, rate: float, *, anti_alias: bool = True) -> tuple[Signal, ResamplingReport]:
     """Return a signal at another rate, and the effect on its acceleration.
 
-    1. Uneven times are first brought to even ones, at their mean rate or the new one if that is higher, along the
-       monotone cubic.
-    2. To a lower rate, a symmetric (zero-phase) low-pass passes up to 0.8 of the new Nyquist frequency and damps by 80
-       dB from that on.
-    3. New samples are taken from the quintic spline, or are every so many old ones where the rates allow it.
+    1. Uneven times are first made equidistant along the monotone cubic, at their mean rate or at the new rate if that
+       is higher.
+    2. If the rate decreases, a symmetric (zero-phase) low-pass passes frequencies up to 0.8 of the new Nyquist
+       frequency and attenuates those above the Nyquist frequency by 80 dB.
+    3. New samples are taken from the quintic spline, or are every n-th old sample if the ratio n of the rates is whole.
 
     Parameters
     ----------
     signal
-        Any.
+        Any signal.
     rate
-        New samples a second [Hz]; the first sample stays where it is.
+        New number of samples per second [Hz]; the first sample keeps its time.
     anti_alias
-        False leaves step 2 out: what lies above the new Nyquist frequency is mirrored below it.
+        False: step 2 is skipped, and frequencies above the new Nyquist frequency are aliased.
 
     Raises
     ------

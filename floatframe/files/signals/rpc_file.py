@@ -1,10 +1,10 @@
 """Signals in RPC III, the format of road simulators (.rsp, .drv, .tim): reading and writing.
 
 A file is made of blocks of 512 bytes. The head has NUM_HEADER_BLOCKS of them, each of four parameters: a key of 32
-bytes and a value of 96 bytes, both text filled with zeros; FORMAT, NUM_HEADER_BLOCKS and NUM_PARAMS come first. The
-numbers stand in groups: of each channel, one after the other, PTS_PER_GROUP samples, which are
-PTS_PER_GROUP/PTS_PER_FRAME frames; the last group is filled up. A short integer n stands for n SCALE.CHAN_k
-INT_FULL_SCALE/32768, a float for itself.
+bytes and a value of 96 bytes, both text padded with zeros; FORMAT, NUM_HEADER_BLOCKS and NUM_PARAMS come first. The
+numbers are stored in groups: PTS_PER_GROUP samples of each channel, one channel after the other, which are
+PTS_PER_GROUP/PTS_PER_FRAME frames; the last group is padded. A short integer n is the value n SCALE.CHAN_k
+INT_FULL_SCALE/32768; a float is the value itself.
 """
 
 import os
@@ -37,7 +37,7 @@ def read_rpc(path: str | os.PathLike[str]) -> Signals:
     Raises
     ------
     SignalError
-        If a parameter is missing or impossible, or the file is not as long as its head says.
+        If a parameter is missing or impossible, or the length of the file differs from that in its head.
     """
     path = Path(path)
     size = path.stat().st_size
@@ -191,7 +191,7 @@ def write_rpc(
 ) -> None:
     """Write channels as an RPC III file, in groups of one frame of 1024 samples.
 
-    The last frame is filled up with the last sample; the number of samples stands in the head (SAMPLES), too.
+    The last frame is padded with the last sample; the head also contains the number of samples (SAMPLES).
 
     Parameters
     ----------
@@ -200,8 +200,8 @@ def write_rpc(
     path
         The file; conventionally .rsp for responses, .drv for drives, .tim for other time histories.
     integers
-        Numbers as short integers, each channel scaled to its largest value (an error of 1/65534 of it), instead of
-        floats of single precision.
+        Whether numbers are written as short integers, with each channel scaled to its largest value (an error of
+        1/65534 of it), instead of floats of single precision.
     time_type
         RESPONSE, DRIVE, DESIRED, MULT_DRIVE or another word of the format.
 
@@ -250,7 +250,7 @@ def record_of(path: Path, key: str, value: str) -> bytes:
     try:
         words = key.encode("ascii"), value.encode("cp1252")
     except UnicodeEncodeError:
-        raise SignalError(f"{path}: {key} = {quoted(value)}: RPC III holds Windows-1252 text only") from None
+        raise SignalError(f"{path}: {key} = {quoted(value)}: RPC III supports only Windows-1252 text") from None
     if len(words[0]) >= KEY or len(words[1]) >= VALUE or b"\0" in words[1]:
         raise SignalError(f"{path}: {key} = {quoted(value)}: expected up to {VALUE - 1} characters")
     return words[0].ljust(KEY, b"\0") + words[1].ljust(VALUE, b"\0")

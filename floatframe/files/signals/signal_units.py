@@ -1,7 +1,7 @@
 """Units of signals in files ("m/s^2", "g", "kN", "deg", "rpm"), and the factors between them.
 
-"g" is the standard gravity, 9.80665 m/s², alone and beside times, frequencies and volts (g²/Hz, mV/g); beside others
-it could be the gram, and is not understood. kg is a word of its own.
+"g" is the standard gravity, 9.80665 m/s², if it is alone or combined with times, frequencies and volts (g²/Hz, mV/g).
+In other combinations it could be the gram, and is not understood. kg is a separate unit.
 """
 
 import re

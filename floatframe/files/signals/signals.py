@@ -108,7 +108,7 @@ class Signals:
         Raises
         ------
         SignalError
-            With the nearest name if there is none, or several have the name.
+            If there is no such channel (the message has the nearest name), or several channels have the name.
         """
         where = f"{self.source or 'signals'}: channel"
         if isinstance(channel, int):

@@ -1,8 +1,8 @@
 """Spectra of sampled signals: power spectral density (Welch) and amplitudes, with the corrections of the windows named.
 
-A window w_j of n samples, of sums S1 = Σ w_j and S2 = Σ w_j², scales a line by its coherent gain S1/n and noise by its
-noise bandwidth n S2/S1² [lines]. So, with X_k the transform of the samples times the window and f_s the rate, both
-one-sided (twice the power of lines between 0 and f_s/2):
+A window w_j of n samples, with the sums S1 = Σ w_j and S2 = Σ w_j², multiplies a line by its coherent gain S1/n and
+noise power by its noise bandwidth n S2/S1² [lines]. With the transform X_k of the samples times the window and the rate
+f_s, both one-sided (twice the power of lines between 0 and f_s/2):
 
 (1) density        G_k = 2 |X_k|² / (f_s S2)       its sum times the resolution is the mean square (Parseval)
 (2) mean square    P_k = 2 |X_k|² / S1²            of a line on the resolution: amplitude √(2 P_k), rms √P_k
@@ -95,7 +95,7 @@ def window_corrections(window: str, n: int = 1024) -> WindowCorrections:
 def segment_length(n_t: int, n_segment: int | None, overlap: float, averages: int, where: str) -> int:
     """Return the number of samples of a segment: as requested, or for a number of segments in the record."""
     if not 0 <= overlap < 1:
-        raise SignalError(f"{where}: overlap = {overlap:g}: expected a number of 0 up to 1, that not included")
+        raise SignalError(f"{where}: overlap = {overlap:g}: expected a number from 0 to below 1")
     n = n_segment if n_segment is not None else int(n_t / (1 + (averages - 1) * (1 - overlap)))
     while n_segment is None and n > LEAST_SAMPLES and number_of_segments(n_t, n, overlap) < averages:
         n -= 1  # an odd segment overlaps by half a sample less
@@ -127,7 +127,7 @@ def squared(values: Array, rate: float, where: str, **options: Any) -> tuple[Arr
         f, lines = welch(values, rate, **options)
     if not np.isfinite(lines).all():
         raise SignalError(
-            f"{where}: samples of up to {np.abs(values).max():.3g} are too large to be squared; look at their unit"
+            f"{where}: samples of up to {np.abs(values).max():.3g} are too large to be squared; check their unit"
         )
     return f, lines
 
@@ -150,17 +150,17 @@ def psd(
     values
         Samples, (n_t,) in `unit`.
     rate
-        Samples a second [Hz].
+        Samples per second [Hz].
     window
         One of `WINDOWS`.
     n_segment
-        Samples of a segment; by default such that there are eight segments.
+        Number of samples of a segment; default: such that there are eight segments.
     overlap
-        Part of a segment that the next one shares.
+        Fraction of a segment that it shares with the next one.
     detrend
-        What is taken off each segment: its mean (constant), its straight line (linear), none.
+        Part that is removed from each segment: "constant" (its mean), "linear" (its straight line) or "none".
     unit, name
-        Of the signal.
+        Unit and name of the signal.
 
     Returns
     -------
@@ -203,10 +203,10 @@ def amplitude_spectrum(
 ) -> Spectrum:
     """Return amplitudes of lines, equation (2) of this module: peak values A of A sin(2 pi f t), or rms values A/√2.
 
-    A line between two of the resolution is seen too small by the scalloping of the window (hann 15 %, flattop 0.1 %,
-    rectangular 36 %); see `window_corrections`. Parameters as of `psd`; by default one segment, the whole record.
-    Several segments are averaged in power. Broad-band noise has no amplitude: its lines depend on the resolution, take
-    `psd`.
+    A line between two multiples of the resolution appears too small by the scalloping of the window (hann 15 %, flattop
+    0.1 %, rectangular 36 %); see `window_corrections`. Parameters are those of `psd`; by default there is one segment,
+    the whole record. Several segments are averaged in power. Broad-band noise has no amplitude, because its lines
+    depend on the resolution; use `psd`.
     """
     where = f"amplitude spectrum of {name!r}"
     values = checked_samples(values, rate, detrend, where)

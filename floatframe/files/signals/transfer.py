@@ -52,12 +52,12 @@ def transfer_estimate(
 ) -> TransferEstimate:
     """Return the frequency responses H1, H2 of y to x and their coherence, by segments as in `psd`.
 
-    Where x or y has no power at a frequency, H and coherence are NaN there.
+    H and coherence are NaN at frequencies where x or y has no power.
 
     Raises
     ------
     SignalError
-        If the records differ in length, or there is one segment only, whose coherence is 1 whatever the signals are.
+        If the records differ in length, or there is only one segment, whose coherence is 1 for all signals.
     """
     from scipy.signal import csd, welch
 

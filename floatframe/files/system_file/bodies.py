@@ -62,9 +62,7 @@ class BodySection(Table):
     )
     masses: list[MassSection] = Field([], description="tables [[bodies.NAME.masses]], masses fixed to the body")
     modes: list[Count] | None = Field(None, description="a list of whole numbers from 0, the modes to keep")
-    without_modes: list[Count] | None = Field(
-        None, description="a list of whole numbers from 0, the modes to leave out"
-    )
+    without_modes: list[Count] | None = Field(None, description="a list of whole numbers from 0, the modes to remove")
     is_rigid: bool | None = Field(None, description="true: a flexible body without its modes")
     position: Vector3 | None = Field(
         None, description="the position of the body (mesh) origin, [x, y, z]; without it, the joints place the body"

@@ -270,7 +270,7 @@ class ChannelSection(Table):
     quantity: choice("quantity", lambda: QUANTITIES) | None = Field(  # type: ignore[valid-type]
         None, description=f"one of {', '.join(QUANTITIES)}"
     )
-    relative_to: str | None = Field(None, description="the name of the body against which it is taken")
+    relative_to: str | None = Field(None, description="the name of the body relative to which it is measured")
     relative_marker: MeasuredPlace | None = Field(None, description="an interface of, or a position in that body")
     joint: str | None = Field(None, description="the name of a joint")
     coordinate: str | None = Field(None, description='a coordinate of the joint; without joint "JOINT.COORDINATE"')
@@ -365,7 +365,7 @@ class OutputSection(ChannelSection):
     @model_validator(mode="after")
     def _fits(self) -> "OutputSection":
         if self.way() == "component" and (self.body is None or self.position is None):
-            raise ValueError("a stress needs body and position: where it is")
+            raise ValueError("a stress needs body and position")
         return self
 
     def output(self, name: str, sensors: Sequence[Sensor]) -> AnyOutput:

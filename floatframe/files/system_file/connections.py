@@ -238,7 +238,7 @@ class ForceSection(Table):
     amplitude: MotionSection | None = Field(None, description="a table, the factor as a function of time")
     joint: Name | None = Field(None, description="the name of a joint")
     coordinate: Name | None = Field(None, description="a coordinate of the joint")
-    free: float | None = Field(None, description="a number, the coordinate where the spring is free")
+    free: float | None = Field(None, description="a number, the coordinate at which the spring has no force")
     motor: float | MotionSection | None = Field(
         None, description="a number, or a table, the force as a function of time; 0 if a controller drives it"
     )
@@ -256,7 +256,7 @@ class ForceSection(Table):
         None, description=f"tables of the force over one deformation, of {', '.join(DEFORMATIONS)}"
     )
     axes: choice("axes", lambda: tuple(AXES)) | None = Field(  # type: ignore[valid-type]
-        None, description='in which a bushing acts: those of marker "a" (default) or "b", or "half way" between them'
+        None, description='axes in which a bushing acts: of marker "a" (default) or "b", or "half way" between them'
     )
     radius_a: Positive | None = Field(None, description="a number above 0, the radius of the sphere at marker_a")
     radius_b: Positive | None = Field(None, description="a number above 0, the radius of the sphere at marker_b")
@@ -267,7 +267,7 @@ class ForceSection(Table):
     dissipation: choice("law of restitution", lambda: tuple(DISSIPATIONS)) | None = Field(  # type: ignore[valid-type]
         None, description=f"one of {', '.join(DISSIPATIONS)}"
     )
-    slow: Positive | None = Field(None, description="a number above 0, the least speed of approach")
+    slow: Positive | None = Field(None, description="a number above 0, the smallest speed of approach")
     coordinates: dict[str, NamedCoordinate] | None = Field(
         None, description='coordinates by name, each "JOINT.COORDINATE" or a table'
     )
@@ -276,7 +276,7 @@ class ForceSection(Table):
     switches: dict[str, str] | None = Field(
         None, description="expressions at whose zeros the forces jump, text, by a name that stands for their sign"
     )
-    states: dict[str, float] | None = Field(None, description="values of states at the start, numbers by state")
+    states: dict[str, float] | None = Field(None, description="initial values of states, numbers by state")
     parameters: dict[str, float] | None = Field(None, description="numbers of the expressions, by name")
     functions: dict[str, MotionSection] | None = Field(None, description="tables of functions of one number, by name")
 

@@ -67,7 +67,7 @@ __all__ = ["RunOptions", "read_system", "unit_hints"]
 
 
 EARTH = 9.80665  #: m/s²
-POWERS = (1e-6, 1e-3, 1e3, 1e6)  #: factors by which a number is wrong if m and mm, or kg and t, are mixed up
+POWERS = (1e-6, 1e-3, 1e3, 1e6)  #: factors by which a number is wrong if m and mm, or kg and t, are confused
 NEAR = 0.02  #: relative difference from such a factor
 FAR = 300.0  #: ratio of radius of gyration to size of the system, or the inverse with its square, that no real part has
 

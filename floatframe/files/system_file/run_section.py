@@ -50,7 +50,7 @@ class RunSection(Table):
     t_end: Annotated[float, Field(gt=0)] = Field(description="a number above 0, the end time")
     h: Annotated[float, Field(gt=0)] = Field(description="a number above 0, the step size")
     output_every: Annotated[int, Field(ge=1)] = Field(
-        1, description="a whole number above 0: results are written after every so many steps"
+        1, description="a whole number above 0, the number of steps between written results"
     )
     scheme: choice("scheme", lambda: tuple(INTEGRATORS)) = Field(  # type: ignore[valid-type]
         "generalized-alpha", description=f"one of {', '.join(INTEGRATORS)}"
@@ -107,7 +107,7 @@ class RunSection(Table):
     def _fits_the_scheme(self) -> "RunSection":
         allowed = keys_of(self.scheme)
         if self.formulation != "absolute" and INTEGRATORS[self.scheme] not in OF_BOTH_FORMULATIONS:
-            raise ValueError(f"the scheme {self.scheme} works in absolute coordinates alone; take away formulation")
+            raise ValueError(f"the scheme {self.scheme} works only in absolute coordinates; remove formulation")
         for key in type(self).model_fields:
             if key not in NOT_OF_A_METHOD and getattr(self, key) is not None and key not in allowed:
                 raise ValueError(f"the scheme {self.scheme} has no key {key}{nearest(key, allowed)}")
@@ -209,7 +209,7 @@ def required_run(run: RunOptions | None, path: str | os.PathLike[str], *, begins
     Raises
     ------
     SystemFileError
-        If there is no run, or if it begins elsewhere than with the bodies as placed, where the caller does.
+        If there is no run, or if it does not begin with the bodies as placed although the caller does.
     """
     if run is None:
         raise SystemFileError(f"{path}: run: missing; expected a table [run] with t_end and h, for a motion over time")

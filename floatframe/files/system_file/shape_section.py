@@ -23,7 +23,7 @@ class ShapeSection(Table):
     type: choice("geometry", lambda: tuple(GEOMETRIES)) = Field(  # type: ignore[valid-type]
         description=f"one of {', '.join(GEOMETRIES)}"
     )
-    position: Vector3 = Field((0.0, 0.0, 0.0), description="the place of its origin, [x, y, z]")
+    position: Vector3 = Field((0.0, 0.0, 0.0), description="the position of its origin, [x, y, z]")
     rotation_vector: Vector3 = Field((0.0, 0.0, 0.0), description="axis times angle in rad, [x, y, z]")
     color: str | None = Field(None, description='a colour, "#rrggbb" or a name such as "steel"')
     opacity: Positive = Field(1.0, description="a number above 0 and up to 1")
@@ -37,7 +37,7 @@ class ShapeSection(Table):
     width: Positive | None = Field(None, description="a number above 0, the width")
     axis: Vector3 | None = Field(None, description="the direction of the axis, [x, y, z]")
     n_spokes: int | None = Field(None, description="a whole number from 0 to 60, the spokes of a wheel")
-    flange_side: int | None = Field(None, description="1, -1 or 0: where along the axis the flange is")
+    flange_side: int | None = Field(None, description="1, -1 or 0: the end of the axis with the flange, or none")
     flange_height: Positive | None = Field(None, description="a number above 0, the height of the flange")
     conicity: NotNegative | None = Field(None, description="0 or more, the conicity of the tread as drawn")
     points: list[Vector3] | None = Field(None, description="a list of points, [[x, y, z], ...]")
@@ -51,7 +51,9 @@ class ShapeSection(Table):
     up: Vector3 | None = Field(None, description="the direction upwards, [x, y, z]")
     is_painted: bool | None = Field(None, description="whether a road has lines painted on it")
     gauge: Positive | None = Field(None, description="a number above 0, between the middles of the rails")
-    cant: float | list[float] | None = Field(None, description="how much higher the left rail lies, one number or many")
+    cant: float | list[float] | None = Field(
+        None, description="the height of the left rail above the right one, one number or many"
+    )
     rail_height: Positive | None = Field(None, description="a number above 0, the height of the rails")
     sleeper_distance: Positive | None = Field(None, description="a number above 0, from sleeper to sleeper")
     file: Annotated[Path, BeforeValidator(existing_file("surface such as an .stl file"))] | None = Field(

@@ -50,7 +50,7 @@ class SignalSection(Table):
     column: Annotated[str | int | None, Field(description=CHANNEL)] = None
     unit: str | None = Field(None, description='the unit of its numbers, such as "mm", "g" or "kN"; "-" for a number')
     time: Name | None = Field(None, description="the name of the column with the times")
-    rate: Positive | None = Field(None, description="a number above 0, samples a second of a file without times")
+    rate: Positive | None = Field(None, description="a number above 0, samples per second of a file without times")
     decimal: choice("decimal sign", lambda: (".", ",")) | None = Field(  # type: ignore[valid-type]
         None, description='"." or ","'
     )
@@ -80,7 +80,7 @@ class SignalSection(Table):
         if self.channel is not None and self.column is not None:
             raise ValueError("expected channel or column, which are the same, got both")
         if self.integrate and self.interpolation is not None:
-            raise ValueError("interpolation: an acceleration that is integrated is straight lines; remove it")
+            raise ValueError("interpolation: an acceleration that is integrated is linear between samples; remove it")
         for key in ("drift", "corner", "position", "velocity"):
             if not self.integrate and getattr(self, key) is not None:
                 raise ValueError(f"{key}: belongs to integrate = true")

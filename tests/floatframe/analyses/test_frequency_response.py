@@ -327,7 +327,7 @@ def test_files_name_sensors_as_outputs_and_bases_as_inputs(pendulum):
     assert names[0] == "side"
     assert names[1:4] == [f"bearing.force {axis}" for axis in "xyz"]
     assert units[0] == "N"
-    assert "left out: bearing.moment size" in text
+    assert "omitted: bearing.moment size" in text
     s = 2j * np.pi * 0.7
     H = C @ np.linalg.solve(s * np.eye(len(A)) - A, B) + D
     m, J, c, g = 2.0, 1 / 6 + 0.5, 0.5, 9.81

@@ -120,7 +120,7 @@ def test_plot_goes_without_the_modal_files_and_says_so(folder):
     (folder / "part.h5").unlink()
     result = run("plot", folder / "spin.h5")
     assert result.exit_code == 0
-    assert result.stderr.startswith("note: elastic displacement is left out")
+    assert result.stderr.startswith("note: elastic displacement is omitted")
 
 
 def test_plot_refuses_other_kinds_of_files(results, tmp_path):

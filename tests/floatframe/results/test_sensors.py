@@ -272,7 +272,7 @@ def test_results_whose_system_file_has_gone_or_changed_are_still_shown(spin, cap
     spin.write_text(TEXT.replace("hinge]", "axle]").replace('"hinge"', '"axle"'))
     result = CliRunner().invoke(app, ["info", str(results)])
     assert result.exit_code == 0
-    assert "note: sensors are left out" in result.stderr
+    assert "note: sensors are omitted" in result.stderr
     spin.unlink()
     assert "Sensors" not in run("info", results)
     assert "system file of the run does not exist any more" in run("plot", results, "-s", "tip", code=2)

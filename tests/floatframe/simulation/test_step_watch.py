@@ -545,7 +545,7 @@ def test_the_command_line_prints_the_line_and_files_choose(tmp_path, more, words
     assert result.exit_code == 0, result.output
     told = json.loads(CliRunner().invoke(app, ["info", str(tmp_path / "swing.h5"), "--json"]).stdout)["validity"]
     assert [note["kind"] for note in told] == ["steps"] * says
-    assert ("What the run says of its steps" in result.output) == says
+    assert ("Notes on the steps of the run" in result.output) == says
 
 
 def test_notes_of_older_files_are_read():

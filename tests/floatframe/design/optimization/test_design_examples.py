@@ -194,7 +194,7 @@ def test_a_system_is_not_written_away_from_the_files_that_it_names(copied):
     folder = copied("absorber")
     refused = CliRunner().invoke(app, ["optimize", str(folder / "peak.toml"), "-o", str(folder.parent / "best.toml")])
     assert refused.exit_code == 2
-    assert "expected a place beside" in " ".join(refused.stderr.split())
+    assert "expected the folder of" in " ".join(refused.stderr.split())
 
 
 @pytest.mark.parametrize(("old", "new", "words"), [

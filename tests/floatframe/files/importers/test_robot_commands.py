@@ -58,7 +58,7 @@ def test_a_system_file_becomes_a_description_with_the_same_dynamics(gripper, tmp
     result = run("export", tmp_path / "out" / "gripper.toml", "-o", tmp_path / "back" / "g.urdf", "--effort", 9,
                  "--velocity", 2)  # fmt: skip
     assert result.exit_code == 0, result.output
-    assert "note: left out: gravity" in result.stderr
+    assert "note: omitted: gravity" in result.stderr
     assert (tmp_path / "back" / "meshes" / "finger_0.stl").is_file()
     given, back = (robot_system(read_urdf(path)).system for path in (gripper, tmp_path / "back" / "g.urdf"))
     assert_allclose(consistent_state(back).u_dot, consistent_state(given).u_dot, rtol=0, atol=1e-10)

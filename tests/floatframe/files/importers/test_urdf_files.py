@@ -261,7 +261,7 @@ BAD = {
     "negative mass": (GRIPPER.replace('value="2"', 'value="-2"'), "expected a mass of 0 or more, got -2"),
     "axis": (GRIPPER.replace('xyz="0 0 2"', 'xyz="0 0 0"'), "line 22: <axis>: xyz: expected a direction"),
     "no limits": (GRIPPER.replace('<limit lower="-0.2" upper="0.9" effort="2" velocity="3"/>', ""), "continuous"),
-    "limits": (GRIPPER.replace('upper="0.9"', 'upper="-0.9"'), "expected lower up to upper, got -0.2 and -0.9"),
+    "limits": (GRIPPER.replace('upper="0.9"', 'upper="-0.9"'), "expected lower <= upper, got -0.2 and -0.9"),
     "damping": (GRIPPER.replace('damping="4"', 'damping="-4"'), "damping: expected 0 or more"),
     "leader": (GRIPPER.replace('mimic joint="knuckle"', 'mimic joint="knuckel"'), "did you mean 'knuckle'"),
     "itself": (GRIPPER.replace('mimic joint="knuckle"', 'mimic joint="other"'), "follow each other in a ring"),

@@ -132,7 +132,7 @@ def test_a_waterfall_shows_a_line_where_it_is():
         (0.01 * ANGLE, {}, "turns, a block has 4"),
         (ANGLE, {"resolution": 0.0}, "0 < resolution <= 1"),
         (ANGLE, {"slowest": 1e4}, "nowhere faster than 10000"),
-        (np.cumsum(np.where(t < 3, 1e-7, 1.0)), {"slowest": 1e-6}, "leave slow speeds out"),
+        (np.cumsum(np.where(t < 3, 1e-7, 1.0)), {"slowest": 1e-6}, "exclude slow speeds"),
     ],
 )
 def test_impossible_rotations_are_refused(angle, options, words):

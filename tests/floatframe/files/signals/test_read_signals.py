@@ -124,7 +124,7 @@ def test_uneven_times_may_be_meant(tmp_path):
         ("a [g],b [g]\n0,1\n1.5,2\n", r"taken as the time, is in g \(acceleration\)"),
         ("t [s]\n0\n1\n", "expected a channel besides the time"),
         ("words\nand words\n", "no row of numbers"),
-        (b"\x00\x01\x02\x03" * 99, "bytes that are none"),
+        (b"\x00\x01\x02\x03" * 99, "got binary data"),
     ],
 )
 def test_doubtful_tables_are_asked_back(tmp_path, text, words):

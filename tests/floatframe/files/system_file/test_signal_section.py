@@ -158,7 +158,7 @@ def test_what_was_done_is_said(bench, caplog):
             r"signals.road: .*expected an acceleration to integrate twice, got the unit 'mm'",
         ),
         ({"road": 'drift = "mean"'}, "drift: belongs to integrate = true"),
-        ({"shock": 'interpolation = "cubic"'}, "straight lines; remove it"),
+        ({"shock": 'interpolation = "cubic"'}, "linear between samples; remove it"),
         ({"shock": 'drift = "hihg-pass"'}, "did you mean 'high-pass'"),
         ({"road": "resample = 0"}, "signals.road.resample = 0: expected a number above 0, the new rate in Hz"),
         ({"road": "low_pass = 900.0"}, r"signals.road: .*low_pass = 900.0 Hz: .*below half the rate, 500 Hz"),
