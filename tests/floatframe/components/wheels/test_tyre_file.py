@@ -58,7 +58,7 @@ def test_what_is_missing_or_left_out_is_said():
 
 def test_the_version_can_be_said():
     text = TEXT.replace("FITTYP   = 61", "FITTYP = 5")
-    with pytest.raises(ModelError, match=r'FITTYP = 5 is unknown .*say version = "5\.2"'):
+    with pytest.raises(ModelError, match=r'FITTYP = 5 is unknown .*give version = "5\.2"'):
         tyre_from_text(text, "x")
     assert tyre_from_text(text, "x", version="5.2").version == 52
     assert changed("FITTYP   = 61", "PROPERTY_FILE_FORMAT = 'PAC2002'").version == 52
