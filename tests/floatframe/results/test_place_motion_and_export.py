@@ -57,7 +57,7 @@ def differences(values):
 def test_a_point_of_a_flexible_body_does_not_leave_its_deformation_out_in_silence(swing):
     with pytest.raises(ResultsError, match=r"'rod' is flexible: .* give its modal file, reduced="):
         point_motion(swing, "rod", (0.3, -0.4, 0.5))
-    with pytest.raises(ResultsError, match=r"point_motion: body 'rod': no node that its file keeps is at .* nearest:"):
+    with pytest.raises(ResultsError, match=r"point_motion: body 'rod': no kept node is at .* nearest:"):
         point_motion(swing, "rod", REDUCED.nodes[5] + 0.2, reduced=REDUCED)
     with pytest.raises(ResultsError, match="either its reduced body or undeformed=True, got both"):
         point_motion(swing, "rod", REDUCED.nodes[5], reduced=REDUCED, undeformed=True)

@@ -77,7 +77,7 @@ def test_a_sensor_beside_the_kept_nodes_is_refused(offset, tolerance, is_refused
     motion = integrate(system, GeneralizedAlpha(), 1e-3, 1e-3)
     sensor = PlaceSensor("place", Marker("arm", position=reduced.nodes[4] + [0.0, offset, 0.0], tolerance=tolerance))
     if is_refused:
-        with pytest.raises(ModelError, match=r"body 'arm': no node that its file keeps is at .* nearest: node index"):
+        with pytest.raises(ModelError, match=r"body 'arm': no kept node is at .* nearest: node index"):
             measured(system, motion, [sensor])
     else:
         assert np.isfinite(measured(system, motion, [sensor])["place"].columns["x"]).all()

@@ -140,7 +140,7 @@ def test_a_folder_with_a_flexible_link_is_the_same_system(beam, tmp_path):
     assert_allclose(consistent_state(system).u_dot, consistent_state(found.system).u_dot, rtol=0, atol=1e-9)
     with pytest.raises(UrdfError, match="a system file needs its modal file"):
         write_system(robot_system(robot, flexible=arm(beam, tmp_path)[1]), tmp_path / "no")
-    with pytest.raises(UrdfError, match=r"link 'upper' is flexible, so that its frame is no place.*: root, tip"):
+    with pytest.raises(UrdfError, match=r"link 'upper' is flexible, so that its frame is not a place.*: root, tip"):
         found.place("upper")
     with pytest.raises(UrdfError, match="URDF has no flexible bodies; replace by rigid bodies: upper"):
         robot_of_system(found.system)
