@@ -199,7 +199,7 @@ def test_elongation_between_numbers_is_that_between_places(motions):
         (PlaceSensor("s", Marker("bar", position=(0.5, 0.0, 0.0)), "rotation-vector"), "keeps no rotation; keep it"),
         (
             PlaceSensor("s", Marker("bar", position=(0.52, 0.0, 0.0))),
-            r"within 0.001 of its size .* nearest: node \d+ at",
+            r"within 0.001 of the body size .* nearest: node \d+ at",
         ),
         (
             StrainGauge("s", "bar", (1, 0, 0), 1.0, 0.3, position=(0.52, 0, 0)),

@@ -196,7 +196,7 @@ def test_a_wheel_upside_down_or_on_its_side_is_refused(height, A, message):
 
 def test_the_envelope_of_another_wheel_is_refused():
     road = wheels.step(1.0, 0.05, length=3.0).enveloped(0.25)
-    with pytest.raises(ModelError, match=r"the wheel's is 0\.3"):
+    with pytest.raises(ModelError, match=r"radius of the wheel is 0\.3"):
         tyre(road=road)
 
 

@@ -150,7 +150,7 @@ def read(tmp_path, road):
         ('{type = "moon"}', "road.type: expected one of flat, profile"),
         ('{type = "profile", x = [0, 1]}', "road.z: missing"),
         ('{type = "profile", x = [0, 0], z = [0, 0]}', "increasing numbers"),
-        ('{type = "step", at = 1.0, height = 0.1, length = 3.0, envelope = 0.25}', "the wheel's is 0.3"),
+        ('{type = "step", at = 1.0, height = 0.1, length = 3.0, envelope = 0.25}', "radius of the wheel is 0.3"),
         ('{type = "ramp", at = 1.0, height = 0.1, length = 3.0}', "road.run: missing"),
         ('{type = "iso-8608", class = "C", length = 5.0}', "road.seed: missing"),
         ('{type = "flat", slope = 1.0}', "has no key 'slope'"),
