@@ -507,7 +507,9 @@ def correlate_command(
 def split_command(
     job: Annotated[Path, typer.Argument(help="Job file (TOML) of the whole body.")],
     n: Annotated[int | None, typer.Option("--parts", help="Number of parts of equal length.")] = None,
-    at: Annotated[str | None, typer.Option(help="Instead of -n: cut positions along the axis, such as 40,80.")] = None,
+    at: Annotated[
+        str | None, typer.Option(help="Instead of --parts: cut positions along the axis, such as 40,80.")
+    ] = None,
     axis: Annotated[
         str | None, typer.Option(help="Normal direction of the cuts: x, y, z or x,y,z; default: the longest axis.")
     ] = None,

@@ -89,7 +89,8 @@ class Part:
     """Body without interfaces; its first nodes are nodes of the joined body."""
 
     body: FEBody
-    #: node of the joined body for each of its first n nodes, (n,); further nodes are skin nodes without dofs
+    #: for each of the first n nodes of the part, its node in the joined body, (n,); further nodes of the part are skin
+    #: nodes without dofs
     nodes: IntArray
 
 

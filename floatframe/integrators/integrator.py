@@ -186,7 +186,10 @@ def coasted(
 
 
 class FollowedRotations:
-    """Counted rotations of bushings for a method that chooses its own steps; they are written into the iterate."""
+    """Rotation vectors of bushings, continuous through full turns, for a method that chooses its own steps.
+
+    They are written into the iterate.
+    """
 
     def __init__(self, model: Model, work: Work, t: float, memory: Memory) -> None:
         """Begin to count from the state of a motion at time t."""

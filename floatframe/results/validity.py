@@ -142,8 +142,11 @@ class ValidityNote:
         if self.kind == "rotation" and 0 <= self.in_mean_axes < self.largest:
             frame = 'take mean axes (cms frame --to tisserand, [body] frame = "tisserand")'
             if self.in_mean_axes <= self.limit:
-                return f"{frame}: there it rotates by {self.in_mean_axes:.3g} rad, within the limit"
-            return f"{frame}: there it rotates by {self.in_mean_axes:.3g} rad; then {self.next_action}"
+                return f"{frame}; relative to them it rotates by {self.in_mean_axes:.3g} rad, within the limit"
+            return (
+                f"{frame}; relative to them it rotates by {self.in_mean_axes:.3g} rad, still above the limit: "
+                f"also {self.next_action}"
+            )
         return self.next_action
 
     @property

@@ -376,7 +376,7 @@ def apart_from_cardan(a: MarkerData, b: MarkerData, k: int, rows: Rows) -> Array
 
 
 def of_element(beyond: Callable[[Array], Array], markers: tuple[MarkerData, ...], rows: Rows) -> Array:
-    """Return the value that an element declares for its angles (`Element.small_angles`), for each row, (n_t,)."""
+    """Return the relative error of the small-angle terms of an element (`Element.small_angles`) by row, (n_t,)."""
     return beyond(np.stack([rotation_matrix(orientations_of(marker, rows)) for marker in markers], axis=1))
 
 

@@ -1,4 +1,7 @@
-"""Assessment of one mode set with one number of modes, in small coordinates, by records of `cms.assessment.quality`."""
+"""Assess one mode set with a given number of modes, in the coordinates of a small basis (`coordinates.py`).
+
+The results are records of `cms.assessment.quality`.
+"""
 
 from dataclasses import dataclass, replace
 

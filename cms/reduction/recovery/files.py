@@ -362,7 +362,9 @@ class CraigBampton:
         return np.asarray(np.sqrt(omega2) / (2 * np.pi))
 
     def recover(self, table: RecoveryTable | str) -> InterfaceRows:
-        """Return the rows of a table over (u_b, eta); the equations of motion replace interface loads.
+        """Return the rows of a table as functions of (u_b, eta) and their rates.
+
+        Interface loads are expressed by M, D and K through the equations of motion.
 
         Parameters
         ----------

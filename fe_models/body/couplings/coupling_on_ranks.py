@@ -75,7 +75,8 @@ def spread_body(body: FEBody, ranks: Ranks) -> FEBody:
         return body
     order = nearby_order(body.K, body.dofs, np.arange(body.n_dof))
     rows = even_rows(np.concatenate([[0], np.cumsum(np.diff(body.K.indptr)[order])]), ranks.size)
-    # Without a recovery that knows the ranks of the rows of the mesh, element models would use the columns of rank 0.
+    # Without a recovery, `mesh_displacement` would return the distributed columns themselves. With a map without layout
+    # it gathers them.
     recovery = body.recovery or Recovery(sp.eye_array(body.n_dof, format="csr"), body.dofs)
     return replace(
         body,

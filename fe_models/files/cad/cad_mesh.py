@@ -131,7 +131,7 @@ def _set_size(model: CadModel, size: MeshSize) -> None:
     """Set the element sizes in gmsh in its unit; the options are restored when the model is closed."""
     largest = size.size * model.scale
     volume = model.part.volume
-    estimate = 9 * volume / size.size**3  # an edge of length h makes about h³/9 of a tetrahedron
+    estimate = 9 * volume / size.size**3  # a tetrahedron with edges of length h has a volume of about h³/9
     if estimate > MOST_ELEMENTS:
         extent = float(np.linalg.norm(model.part.hi - model.part.lo))
         symbol = model.part.units.length_symbol

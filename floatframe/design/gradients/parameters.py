@@ -359,7 +359,10 @@ def with_neighbours(
     make: Callable[[str, float], System], compiled: CompiledSystem, name: str, path: str, value: float, step: float,
     tries: Sequence[float],
 ) -> Parameter:  # fmt: skip
-    """Return a parameter with neighbouring systems: central, then one-sided, then with shorter steps."""
+    """Return a parameter with the systems of its difference stencil.
+
+    Central differences are tried first, then one-sided ones, then both with shorter steps.
+    """
     first: Exception | None = None
     for factor in tries:
         for stencil in CENTRAL_FIRST:

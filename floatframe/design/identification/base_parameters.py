@@ -226,7 +226,10 @@ def unweighed_dipoles(before: list[Move], shift: Array) -> Array:
 
 
 def rotations(moves: list[Move]) -> tuple[Array | None, bool]:
-    """Return the common direction of all rotations (None if there is none), and whether there are several."""
+    """Return the common direction of all rotations, and whether their directions differ.
+
+    The direction is None if they differ or nothing rotates.
+    """
     e: Array | None = None
     for move in moves:
         if move.turn.any():
@@ -543,7 +546,8 @@ def typical_parameters(form: LinearForm) -> Array:
     """Return typical magnitudes of the parameters of bodies and drives, (p,)."""
     size, time = compiled_system(form.system).length, typical_time(form)
     x = typical_coordinates(form, tree_of(form.system).columns)
-    factors = {"motor-inertia": x / time**2, "viscous": x / time}  # of a parameter in its force; other factors are 1
+    # typical drive force divided by the drive parameter; 1 for the other terms
+    factors = {"motor-inertia": x / time**2, "viscous": x / time}
     drives = [(size / time) ** 2 / x / factors.get(term, 1.0) for term in form.terms]
     return np.concatenate([*([1.0], [size] * 3, [size**2] * 6) * len(form.system.bodies), *drives])
 

@@ -46,7 +46,7 @@ class PlacedLaw:
     length: float = 0.0  #: length over which the law changes
     speed: float = 0.0  #: value of 1 m/s in the units of the system
     time: float = 0.0  #: value of 1 s in the units of the system
-    own_time: float = 0.0  #: time over which the law changes by explicit dependence on time; 0: unknown
+    own_time: float = 0.0  #: time scale of the explicit time dependence of the law; infinite: none, 0: unknown
 
     @property
     def digest(self) -> tuple[int | str | None, ...]:

@@ -124,7 +124,10 @@ def pattern_of(ds: DiscreteSystem) -> tuple[Pattern, dict[str, int]]:
 
 
 def discrete_of(ds: DiscreteSystem, scheme: int, h: float, rho_inf: float) -> tuple[Discrete, dict[str, int]]:
-    """Return a system in the arrays of compiled steps of size h, and the sizes of their working arrays."""
+    """Return the arrays with which compiled code advances a system by steps of size h.
+
+    The second value gives the sizes of the working arrays.
+    """
     model = ds.model
     pattern, sizes = pattern_of(ds)
     blocks, block0 = constants_of(ds, h, rho_inf)

@@ -445,7 +445,7 @@ def magnification_of(surfaces: Sequence[FlexibleSurface], reduced: Mapping[str, 
 
 
 def speed_of(trajectory: Trajectory) -> float:
-    """Return the initial seconds of motion per second of the page, as in films."""
+    """Return the initial playback speed: seconds of motion per second of viewing, chosen as for films."""
     return film_times(trajectory.t * trajectory.units.time, fps=25.0, speed=None).speed
 
 

@@ -165,7 +165,10 @@ def unit_words(units: Units, what: str) -> str:
 
 
 def amplitude_unit(units: Units, force: Force) -> str:
-    """Return the unit of the motor of a joint force; "1" for the amplitude of a load, which is a factor."""
+    """Return the unit of the amplitude of a force.
+
+    For a joint force it is the unit of the field `motor`. For other loads it is "1": their amplitude is a factor.
+    """
     if not isinstance(force, JointForce):
         return "1"
     return unit_words(units, "moment" if force.is_angular else "force")

@@ -295,6 +295,6 @@ def test_the_advice_on_rotations_is_what_the_remedy_gives():
     nodal, mean = told["nodal"], told["mean"]
     assert nodal.in_mean_axes < 0.8 * nodal.largest
     assert_allclose(nodal.in_mean_axes, mean.largest, rtol=0.03)  # linear frames differ by the square of rotations
-    assert f"there it rotates by {nodal.in_mean_axes:.3g} rad" in nodal.words
+    assert f"relative to them it rotates by {nodal.in_mean_axes:.3g} rad" in nodal.words
     assert mean.in_mean_axes == -1.0
     assert "mean axes" not in mean.words

@@ -44,7 +44,7 @@ class EffectiveMass:
 
     @property
     def remainder(self) -> Array:
-        """Share of the mass in none of the modes, by direction, (6,); 0 if the body has no mass there."""
+        """Fraction of mass and inertia missing from the sum of effective masses, (6,); 0 for a massless direction."""
         return np.where(self.total > 0, 1.0 - self.share.sum(axis=0), 0.0)
 
 
@@ -115,10 +115,11 @@ def total_scale(total: Array) -> Array:
 
 
 def check_driven_mass(reduced: ReducedBody) -> QualityRecord:
-    """Report the largest share of translational mass in none of the modes, over the interfaces that can be fixed.
+    """Report the largest fraction of translational mass missing from the sum of effective modal masses.
 
-    This share consists of the mass at the interface itself and the mass of higher modes; only a check with the full
-    model distinguishes the two ("effective-mass").
+    The largest is taken over all interfaces that can be fixed. The missing fraction consists of the mass at the
+    interface itself and the mass of higher modes; only a check with the full model distinguishes the two
+    ("effective-mass").
     """
     if reduced.n_q == 0:
         return information("driven-mass", "the body has no modes")

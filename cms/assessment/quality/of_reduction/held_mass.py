@@ -35,7 +35,7 @@ class HeldMass:
 
     @property
     def remainder(self) -> Array:
-        """Share of the moving mass in none of the modes of the set, (6,); 0 if no mass moves."""
+        """Fraction of the moving mass missing from the sum over the modes of the set, (6,); 0 if no mass moves."""
         has_mass = self.total > NO_MASS * self.rigid
         return np.where(has_mass, 1 - self.mass.sum(axis=0) / np.where(has_mass, self.total, 1.0), 0.0)
 

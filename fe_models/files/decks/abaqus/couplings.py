@@ -226,7 +226,10 @@ def _mpcs(here: str, block: DeckBlock, draft: Draft) -> None:
 
 
 def _equal(here: str, draft: Draft, leader: int, members: IntArray, *, is_tied: bool) -> None:
-    """Convert PIN (equal displacements) and TIE (equal rotations as well), without lever at any distance."""
+    """Convert PIN (equal displacements) and TIE (also equal rotations).
+
+    Displacements are equal even if the nodes are apart, without the term of a rigid arm.
+    """
     first = draft.node_group(here, [leader])
     for member in np.setdiff1d(members, [leader]).tolist():
         other = draft.node_group(here, [member])

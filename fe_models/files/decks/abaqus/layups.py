@@ -14,7 +14,7 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["layers_of_block", "layups_in_axes"]
 
-#: difference of components or cosines up to which axes of orientations and normals of a flat shell count as parallel
+#: tolerance within which axes count as parallel (difference of components), and normals of a shell (1 - |cosine|)
 PARALLEL = 1e-6
 #: cosine between a shell normal and the layup direction, above which y replaces x as direction, or the layup is refused
 STEEP = 0.9

@@ -117,7 +117,10 @@ def _compliance(young: Array, poisson: Array) -> Array:
 
 
 def read_orientation(here: str, block: DeckBlock, draft: Draft) -> None:
-    """Read named axes: the first through point a, the second in the plane of a and b; then all rotate about one."""
+    """Read named axes: the first through point a, the second in the plane of a and b.
+
+    If the block gives an angle, the axes are then rotated about one of the three.
+    """
     given = block.parameters
     name = given.get("NAME", "").strip('"').upper()
     is_plain = given.get("SYSTEM", "RECTANGULAR").upper().startswith("R")

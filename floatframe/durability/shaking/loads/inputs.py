@@ -7,7 +7,7 @@ from floatframe.errors import ModelError
 __all__ = ["band_notes", "input_index", "require_damped"]
 
 LEAST_DAMPING = 1e-9  #: damping ratio below which a mode counts as undamped
-MARGIN = 1.5  #: multiple of the upper frequency of a band up to which modes affect the response in the band
+MARGIN = 1.5  #: modes up to this multiple of the upper band frequency affect the response in the band
 
 
 def input_index(model: ShakenModel, name: str, where: str) -> int:
