@@ -92,7 +92,7 @@ def reduce_job(
     ranks = None if chosen.spread is None else all_ranks()
     body = job_body(job, stages, on_report=on_report, source=deck, ranks=ranks)  # (2), (3)
     plan = Plan.of(job, body, chosen, budget)  # (4)
-    announce = not job.reduction.reduces_interfaces  # what many boundary dofs cost, unless their number is reduced
+    announce = not job.reduction.reduces_interfaces  # announce the cost of many boundary dofs, unless they are reduced
     with Families(body, announce=announce, solver=plan.solver, to_disk=plan.to_disk) as families:
         with stages(f"mode set {job.reduction.set}"):
             modes = job_mode_set(families, reduction_of(job, body))  # (5), (6)
@@ -212,7 +212,7 @@ class Plan:
     #: geometric stiffness: True, False, or the interfaces whose loads it includes; None: only if it is small
     asked: "Asked"
     is_requested: bool  #: whether the job requests the geometric stiffness, or quadratic modes, which require it
-    #: whether it is computed only if it is small, because the job leaves this open and the elements support it
+    #: whether the geometric stiffness is computed only if it is small: the job leaves it open, and elements support it
     is_optional: bool
     solver: Solver | None = None  #: solver for the factorisation; None: the fastest installed one
     to_disk: bool = False  #: whether the columns are stored on disk

@@ -63,7 +63,7 @@ class Door(ModuleType):
         return found
 
     def with_checks(self, name: str, found: Any) -> Any:
-        """Return a function that checks its arguments; anything else as it is."""
+        """Return a public function with checks of its arguments; other objects are returned unchanged."""
         if self.argument_error is None:
             return found
         from fe_models.foundation.records import at_door
@@ -72,7 +72,7 @@ class Door(ModuleType):
         return at_door(self.__name__, name, found, getattr(import_module(module), error))
 
     def unknown_name_error(self, name: str) -> ImportError | AttributeError:
-        """Return the error for a name that is not names_of here; it tells where the name is, if anywhere."""
+        """Return the error for a name that this module does not offer; it names the modules that offer it, if any."""
         here = self.__name__
         package = here.partition(".")[0]
         text = f"module {here!r} has no attribute {name!r}"

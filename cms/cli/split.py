@@ -88,7 +88,7 @@ def split_job(request: SplitRequest) -> list[Path]:
     if folder.exists() and not folder.is_dir():
         raise JobError(f"--output {folder}: this is a file; expected a folder")
     mesh = mesh_of(job)
-    # the jobs of the parts get the axis as it is used here: a cell whose centre is at a cut must go to the same part
+    # The jobs of the parts get the same axis to the last digit: a cell centred at a cut must go to the same part.
     axis = longest_direction(mesh.nodes) if request.axis is None else np.array(request.axis)
     split = split_mesh(mesh, request.n, at=request.at, axis=axis)
     names_of_cuts = [cut.name for cut in split.cuts]

@@ -196,7 +196,7 @@ def independent_basis(
         for _ in range(2):  # two passes suffice
             C = basis.inner(rest.KX + omega2 * rest.MX)
             T = rest.T - basis.T @ C
-            # computed anew, because the difference lost its leading digits
+            # compute the products anew, because the difference has lost its leading digits
             rest = products.beside(rest.X - basis.combine(C))
             rest.T = T
         size = _length(rest, omega2)

@@ -333,7 +333,10 @@ def _solid_body(
 def _layers(
     raw: RawMesh, where: str, kinds: tuple[str, ...], properties: Mapping[str, Any]
 ) -> list[tuple[tuple[str, ...] | None, Any]]:
-    """Return layers without two cells on the same nodes: groups and their properties, or None and that of all cells."""
+    """Return groups of cells and their properties, in layers without two cells on the same nodes.
+
+    The groups are None if all cells have one property.
+    """
     if "all" in properties:
         return [(None, properties["all"])]
     _require_groups(raw, where, properties)

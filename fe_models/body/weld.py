@@ -353,8 +353,8 @@ def _followers(
         roots = [_root(leader, node) for node in nodes]
         if roots[0] == roots[1]:
             raise BodyError(f"{where}: a joint connects interfaces that are joined already; remove one of the joints")
-        # a node that multipliers alone hold leads: elements then act on its own dofs (PARDISO finds the matrix singular
-        # where multipliers act on the dofs of a node at an arm)
+        # If only multipliers act on one of two nodes, this node leads, and the elements of the other node act on its
+        # dofs. PARDISO finds the matrix singular if multipliers act on the dofs of a node at an arm.
         is_held = [_has_only_multipliers(body, dofs_of[root]) for root in roots]
         lead, follow = roots[::-1] if is_held[1] and not is_held[0] else roots
         leader[follow] = lead

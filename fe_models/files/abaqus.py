@@ -338,7 +338,7 @@ def _elements(
 
     One number more is kept in `orienting`: Abaqus orients beams by a further node.
     """
-    if n_nodes == 0:  # unknown type: counted by its lines, and refused by name later
+    if n_nodes == 0:  # unknown type: count the lines; the type is refused by name later
         return np.zeros((len(block.lines), 2), dtype=np.int64)
     try:
         lines = [np.array(line.rstrip(", ").split(","), dtype=np.int64) for line in block.lines]

@@ -137,7 +137,7 @@ class StatesAtRest:
     sizes: Array  #: typical sizes of these states and multipliers
     own: NDArray[np.bool_]  #: whether each row belongs to these states and multipliers, (n_w,)
     names: tuple[str, ...]  #: names of these states and multipliers, with their elements
-    change: Array = field(default_factory=lambda: np.full(1, np.inf))  #: last change of each, relative to its size
+    change: Array = field(default_factory=lambda: np.full(1, np.inf))  #: last changes, relative to the sizes
     first_step: float = 0.0
     last_step: float = 0.0
 
@@ -208,7 +208,7 @@ class FlowFailure:
     """The end of the flow if it reaches no equilibrium."""
 
     iteration: int
-    has_stood: bool  #: whether it has stagnated for the permitted number of steps
+    has_stood: bool  #: whether the flow has stagnated for the permitted number of steps
     error: float  #: unbalanced forces relative to the acting forces
     state: State
     W: tuple[Array, ...]

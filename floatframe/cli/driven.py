@@ -156,7 +156,7 @@ def coordinates_record(system: "System", motion: "Trajectory") -> dict[str, Any]
 
 
 def coordinate_record(coordinate: "CoordinateMotion", is_driven: bool, units: "Units") -> dict[str, Any]:
-    """Return the range of a coordinate and of its rate; with its force if it is driven."""
+    """Return the ranges of a coordinate, of its rate and, if it is driven, of its force."""
     import numpy as np
 
     value, rate, force = coordinate.value, coordinate.rate, coordinate.force

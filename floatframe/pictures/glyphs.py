@@ -116,7 +116,7 @@ def place_of(
     position = np.array(end_motion(system, trajectory, end).position[rows])
     if isinstance(given, Marker) and given.interface is not None and magnification != 1:
         body = system.body(body_name(given.body))
-        assert isinstance(body, FlexibleBody)  # it has interfaces
+        assert isinstance(body, FlexibleBody)  # as for any marker at an interface
         motion = trajectory.body(body.name)
         moved = motion.q[rows] @ body.reduced.interface(given.interface).Psi[:3].T
         position += (magnification - 1) * np.einsum("tab,tb->ta", rotation_matrix(motion.p[rows]), moved)

@@ -73,7 +73,7 @@ class EnergyWatch:
     def observe(
         self, system: System, rows: Rows, *, is_switched: bool, is_last: bool = False
     ) -> tuple[ValidityNote, ...]:
-        """Take result rows and return new notes; is_switched: other forces act in these rows.
+        """Take result rows and return new notes; is_switched: whether events happened in these rows.
 
         The first steps, with little motion, are assessed only at the end of a run (is_last). Rows are collected,
         because it costs as much to assess a few as many.
@@ -95,7 +95,7 @@ class EnergyWatch:
         return self.judge(system, rows, is_switched=False, is_last=False)
 
     def judge(self, system: System, rows: Rows, *, is_switched: bool, is_last: bool) -> tuple[ValidityNote, ...]:
-        """Assess result rows and return new notes; is_switched: other forces act in these rows."""
+        """Assess result rows and return new notes; is_switched: whether events happened in these rows."""
         d = rows.diagnostics
         energy = d[:, KINETIC] + d[:, STRAIN] + d[:, SPRINGS] + d[:, GRAVITATION]
         now = np.stack([energy, d[:, WORK_GIVEN], d[:, WORK_TAKEN]], axis=1)

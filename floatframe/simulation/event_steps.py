@@ -392,7 +392,8 @@ class EventWatch:
             t = t + acting.part * size if event.at is None else event.at
             row = acting.row._replace(t=np.array([t]))
             reached = self.values_after(row)
-            for i in (acting.j, *(place.j for place in noted)):  # these have passed their levels, despite roundoff
+            # these events have passed their levels: correct values that roundoff leaves on the old side
+            for i in (acting.j, *(place.j for place in noted)):
                 level = events[i].level_passed
                 if (reached[i] - level) * (self.values[i] - level) > 0.0:
                     reached[i] = level

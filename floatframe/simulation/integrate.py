@@ -333,7 +333,7 @@ class Run:
     n_total: int
     output_every: int
     writer: ResultsWriter | None
-    notes: tuple[ValidityNote, ...] = ()  #: notes known before the run, or of its completed part
+    notes: tuple[ValidityNote, ...] = ()  #: notes from before the run, or from the completed part of a resumed run
     kept: list[Rows] = field(default_factory=list)
     seconds_before: float = 0.0  #: computing time before an interruption
     began: float = field(default_factory=time.perf_counter)

@@ -51,7 +51,7 @@ def residual_subset(modes: ModeSet, at_b: Array, n_modes: int) -> tuple[Array, t
 
 
 def leading_subset(modes: ModeSet, at_b: Array, n_modes: int) -> tuple[Array, tuple[str, ...]]:
-    """Select the rigid-body and first-block columns (`n_static`, not counted by n_modes) and the next n_modes columns."""
+    """Select the rigid-body and first-block columns (`n_static`, not counted by n_modes) and the next n_modes ones."""
     n = min(int(modes.data["n_static"][0]) + n_modes, len(modes.labels))
     return np.eye(len(modes.labels), n), modes.labels[:n]
 

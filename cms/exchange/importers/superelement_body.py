@@ -179,7 +179,10 @@ def without_rounding(element: Superelement) -> Array:
 
 
 def static_part(element: Superelement, where: str) -> Array:
-    """Return T in x = T x'; it is the identity if the stiffness does not couple modal coordinates to the boundary."""
+    """Return T in x = T x' that removes the coupling of modal coordinates and boundary from the stiffness.
+
+    T is the identity if there is no such coupling.
+    """
     q = np.flatnonzero(element.is_modal)
     T = np.eye(len(element.dofs))
     if not len(q):

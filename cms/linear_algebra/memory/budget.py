@@ -49,7 +49,7 @@ class ReductionShape:
 
     n_dof: int
     n_columns: int  #: number of columns of the mode set
-    n_modes: int  #: number of vibration modes among them
+    n_modes: int  #: number of vibration modes among the columns
     held: float  #: memory of the process that includes the coupled body [bytes]
     to_disk: bool = False  #: whether the columns are on disk
 

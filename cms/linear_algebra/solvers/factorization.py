@@ -52,7 +52,7 @@ class Inertia:
     """Number of negative and positive eigenvalues; certain only if no pivot is zero to rounding."""
 
     n_negative: int
-    #: number of pivots that are zero to rounding; they are counted in the other numbers with a guessed sign
+    #: number of pivots that are zero to rounding; the other two numbers include them, with guessed signs
     n_zero: int
     n_positive: int
 

@@ -161,7 +161,7 @@ def point_slices(nodes: Array, masses: tuple[PointMass, ...]) -> Slices:
 
 
 def spring_matrix(nodes: Array, spring: Spring, matrix: Array) -> tuple[Array, IntArray]:
-    """Return Bᵀ matrix B, (12, 12), with d = B u for the twelve dofs u of both nodes, and the dof numbers."""
+    """Return a spring matrix over the twelve dofs u of both nodes, Bᵀ matrix B with d = B u, and the dof numbers."""
     B, dofs = spring_motion(nodes, spring)
     return B.T @ matrix @ B, dofs
 

@@ -104,7 +104,7 @@ def rolled(parts: dict[str, Array], roll: Rolling, n_states: int) -> dict[str, A
         return second @ A_2, second @ C_2 + first @ A_1, second @ B_2 + first @ B_1 + zeroth @ A_0
 
     def with_eta(rows: Array, own: Array) -> Array:
-        """Return rows of y and states with rows of eta between them."""
+        """Insert the rows of eta between the rows of y and those of the states."""
         return np.vstack([rows[:n_y], own, rows[n_y:]])
 
     M, C, K = by_x(*(left @ parts[name] for name in "MCK"))

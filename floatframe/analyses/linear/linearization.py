@@ -207,10 +207,10 @@ class LinearSystem:
             first += len(mass)
 
     def with_mass(self) -> tuple["LinearSystem", Array]:
-        """Return the system without massless motions, which follow the others statically, and the map from its z to z.
+        """Return the system without massless motions, and T in z = T z_new.
 
-        The direct effect of inputs on outputs through these motions is added to D, D_rate and D_acceleration. Third
-        rates of inputs, and damping along massless motions, are neglected.
+        Massless motions follow the other motions statically. The direct effect of inputs on outputs through them is
+        added to D, D_rate and D_acceleration. Third rates of inputs, and damping along massless motions, are neglected.
         """
         dynamic, static = self.motions_with_and_without_mass()
         if not static.shape[1]:

@@ -103,7 +103,7 @@ def misaligned_four_bar(describe: Describe, *, turn: TimeFunction, defect: float
         placed(describe(line), f"bar {k + 1}", start, direction, across)
         for k, (line, start, direction, across) in enumerate(zip(lines, (A, B, C), (Y, X, -Y), (-X, Y, X), strict=True))
     ]
-    # in the axes of their marker, whose z is the ground's z for all bars; x and y differ
+    # axis of hinge C in the axes of its marker; the markers of all bars have the ground's z, but different x and y
     tilted = np.sin(defect) * X + np.cos(defect) * Z
     joints: list[Joint] = [
         RevoluteJoint("A", Marker(GROUND), bars[0].marker("start"), axis=Z, motions={"angle": turn}),

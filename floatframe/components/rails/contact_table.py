@@ -111,7 +111,7 @@ def numbers_of_table(table: ContactTable) -> Array:
     """Return the data of the law, read-only: sizes, then coefficients, (n_v + 2, n_roll + 2, n_yaw + 2, all fields)."""
     (v_0, v_1, n_v), (r_0, r_1, n_r) = table.grid.v, table.grid.roll
     c = even_coefficients(coefficients(coefficients(table.values, 1), 2), 3)
-    c = np.moveaxis(c, 0, 3)  # places the axis of parts before that of fields
+    c = np.moveaxis(c, 0, 3)  # move the axis of parts behind those of v, roll and yaw
     c = c.reshape(*c.shape[:3], -1)
     head = [n_v, v_0, (v_1 - v_0) / (n_v - 1), n_r, r_0, (r_1 - r_0) / (n_r - 1), table.grid.yaw[1],
             np.sin(table.grid.yaw[0]) / (table.grid.yaw[1] - 1), c.shape[3]]  # fmt: skip

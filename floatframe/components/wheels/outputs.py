@@ -5,7 +5,7 @@ from numba.extending import register_jitable
 
 __all__ = ["OUTPUTS", "show", "show_energy"]
 
-#: of the contact, in its axes, acting on the wheel; slips as used by the law (with relaxation)
+#: outputs of the contact with units: loads on the wheel in contact axes, slips as the law uses them (with relaxation)
 OUTPUTS = {
     "Fx": "N", "Fy": "N", "Fz": "N", "Mx": "N m", "My": "N m", "Mz": "N m",
     "kappa": "1", "alpha": "rad", "gamma": "rad", "deflection": "m", "loaded_radius": "m",

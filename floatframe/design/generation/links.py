@@ -223,7 +223,10 @@ def frame_in_body(expansion: Expansion, i: int, length: float) -> tuple[Array, A
 def link_of(
     graph: Graph, expansion: Expansion, k: int, symbols: dict[str, Scalar], values: dict[str, float], length: float
 ) -> Link:
-    """Return node k as terms; symbols and values are those of parameters by name, length is the largest of the tree."""
+    """Return node k as terms.
+
+    symbols, values: parameters by name; length: largest length of the tree, for rounding errors.
+    """
     nodes, body = expansion.nodes, int(expansion.nodes.body[k])
     mass, s, P = graph.zero, terms(graph, np.zeros(3)), terms(graph, np.zeros((3, 3)))
     if body >= 0:

@@ -26,7 +26,7 @@ from floatframe.simulation.motion_head import joint_rows
 
 __all__ = ["Column", "OutputRequest", "Take", "columns_of", "moved", "values_at", "wanted_of", "weights_of"]
 
-#: how values over time, (n_t,), become a number: a key of `TAKES`, or a function that returns the number and its
+#: reduction of values over time, (n_t,), to a number: a key of `TAKES`, or a function that returns the number and its
 #: derivatives
 Take = str | Callable[[Array], tuple[float, Array]]
 

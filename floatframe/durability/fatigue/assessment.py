@@ -194,7 +194,7 @@ def places_named(key: str, section: PlacesSection, body: ReducedBody) -> tuple[I
         points.append(np.array(found, dtype=np.int64))
     of_nodes, of_points = np.unique(np.concatenate(nodes)), np.unique(np.concatenate(points))
     if body.point_stress is not None:
-        # nodes between materials have the stress of the stiffest material; explicit stress points replace them
+        # nodes between materials have the stress of the stiffest material: border points, if chosen, replace them
         own = body.point_stress.positions[[k for k in of_points if known[k].endswith(" border")]]
         if len(own) and len(of_nodes):
             distance, _ = cKDTree(own).query(body.nodes[of_nodes])

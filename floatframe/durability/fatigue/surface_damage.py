@@ -323,7 +323,7 @@ def spectral_damage(
 def all_materials(
     curve: SNCurve | None, mean_stress: MeanStress, others: Sequence[FatigueMaterial]
 ) -> tuple[FatigueMaterial, ...]:
-    """Return the materials; the one of the remaining places is first."""
+    """Return all materials, first the one for places that no other material names."""
     if curve is None and not others:
         raise FatigueError("fatigue: expected an S-N curve, or others: materials that name their places")
     return (*(() if curve is None else (FatigueMaterial(curve, mean_stress),)), *others)

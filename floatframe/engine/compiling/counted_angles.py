@@ -114,7 +114,7 @@ def rotation_of(a: MarkerData, b: MarkerData) -> list[CountedAngle]:
 def first_angles(system: System, n_angles: int) -> list[int]:
     """Return, for each bushing, the index of its first counted angle, or -1 if its turns are not counted."""
     counting = [force.counts_turns for force in system.forces if isinstance(force, Bushing)]
-    first = n_angles - 3 * sum(counting)  # they are the last
+    first = n_angles - 3 * sum(counting)  # angles of bushings are the last ones
     return [first + 3 * sum(counting[:k]) if counts else -1 for k, counts in enumerate(counting)]
 
 

@@ -44,7 +44,7 @@ def loads_on_interfaces(system: System, body: int) -> tuple[list[Wrench], list[L
         o = int(model.markers.psi0[m])
         own = model.markers.psi[o : o + 6 * n].reshape(6, n)
         interface = interface_number(reduced, own, model.markers.position[m])
-        if interface < 0:  # the marker of a sliding joint on its line
+        if interface < 0:  # not at an interface: marker of a sliding joint on its line
             continue
         c = int(model.markers.connection[m])
         if c >= 0:

@@ -147,7 +147,7 @@ def held(bodies: list[Body], link: Link) -> tuple[Array, Array]:
     """Return the directions in which a joint fixes a distance, ground axes, (n, 3), and these distances, (n,)."""
     _, A = pose(bodies, link.other if link.is_b else link.own)
     rows = rows_of(bodies, link)
-    screws = [row for row in rows if row.kind == SCREW]  # the distance along the axis is that of the angle zero
+    screws = [row for row in rows if row.kind == SCREW]  # distance along the axis at the angle zero
     found = [(row.x, 0.0) for row in rows if row.kind == POINT]
     found += [(A @ np.cross(row.x, row.z), 0.0) for row in screws]
     for row in rows:

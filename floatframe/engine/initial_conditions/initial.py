@@ -458,7 +458,7 @@ def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState, t:
 # eighth of a turn: a row whose axes E, Z are rotated by delta prescribes f - delta.
 
 
-FAR = np.pi / 4  #: deviation of a prescribed angle above which it is reached in increments, and the largest increment
+FAR = np.pi / 4  #: largest increment by which a prescribed angle approaches its value
 
 
 def driven_angles(model: Model) -> IntArray:

@@ -4,7 +4,7 @@
 
 with constraint rates G v = g_1(t, x) and G a = g_2(t, x, v). All values come from the kernels that `integrate` uses
 (docs/theory.md §6, §10). In the kernels, the complete wrench w of each connection is unknown and has as many rows:
-constraint rows, and rows C w = b that define the wrench. Here the latter are solved:
+constraint rows, and rows C w = b that define the wrench. Here the rows C w = b are solved:
 
     w = w_0(t, x, v) + W(t, x) lam,   C w_0 = b (least norm),   C W = 0,   Jᵀ W = Gᵀ,
 

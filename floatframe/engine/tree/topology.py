@@ -150,7 +150,7 @@ def spanning_tree(system: System, model: Model, charts: dict[int, tuple[Column, 
     mass = model.body_types.mass[model.bodies.kind]
     depth = {-1: 0}
     branches: list[Branch] = []
-    heap: list[tuple[int, int, int, int]] = []  # freedoms, depth, joint, body at its inner end
+    heap: list[tuple[int, int, int, int]] = []  # number of freedoms, depth of the inner body, joint, inner body
 
     def reach(body: int) -> None:
         for k in at.get(body, []):

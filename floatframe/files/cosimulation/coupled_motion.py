@@ -78,7 +78,7 @@ def co_simulate(
     n_macro = number_of_steps(0.0, t_end, wanted)
     H = t_end / n_macro
     with ExitStack() as held:
-        foreign = cast(tuple[ForeignUnit, ...], system.fmus)  # the system knows their names only
+        foreign = cast(tuple[ForeignUnit, ...], system.fmus)  # `System` declares only their names
         files = (*system.files, *(each.file for each in foreign))
         place = None if output is None else held.enter_context(ResultsPlace(output, inputs=files))
         slaves = []

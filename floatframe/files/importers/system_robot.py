@@ -285,7 +285,7 @@ class Exporter:
         is_same = not own.x.any() and (own.R == np.eye(3)).all()
         center = body.center_of_mass if is_same else own.x + own.R @ body.center_of_mass
         tensor = body.inertia if is_same else own.R @ body.inertia @ own.R.T
-        shapes = [each for each in body.shapes if isinstance(each, Shape)]  # all of them, because bodies make them so
+        shapes = [each for each in body.shapes if isinstance(each, Shape)]  # all: bodies convert geometries
         visuals = tuple(self.picture(body, k, shape, own) for k, shape in enumerate(shapes))
         return Link(body.name, Inertial(body.mass, Pose(center), tensor), visuals)
 

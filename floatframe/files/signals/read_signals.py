@@ -22,7 +22,7 @@ __all__ = ["SIGNAL_FORMATS", "read_signals", "without_gaps"]
 SIGNAL_FORMATS = {
     ".csv": "text", ".txt": "text", ".asc": "text", ".dat": "text", ".tsv": "text", ".mat": "MATLAB",
     ".rsp": "RPC III", ".drv": "RPC III", ".tim": "RPC III", ".rpc": "RPC III",
-}  #: of files by their suffix  # fmt: skip
+}  #: format of a file by its suffix  # fmt: skip
 
 
 def read_signals(

@@ -52,7 +52,7 @@ def retraction(theta: Array) -> Retraction:
     hinge, foot = np.array(BRACE), rotated_point(theta, FOOT)
     between = foot - hinge
     d = np.linalg.norm(between, axis=1, keepdims=True)
-    normal = np.stack([between[:, 1], -between[:, 0]], axis=1) / d  # towards the knee, except for its sign
+    normal = np.stack([between[:, 1], -between[:, 0]], axis=1) / d  # unit vector away from the knee
     knee = hinge + between / 2 - np.sqrt(LINK**2 - (d / 2) ** 2) * normal
     jack = np.linalg.norm(rotated_point(theta, HORN) - np.array(JACK), axis=1)
     centre = rotated_point(theta, LEG_CENTRE)[:, 1]

@@ -134,7 +134,7 @@ def interface_load_rows(small: SmallMotions, body: FlexibleBody) -> list[Rows]:
                 own = interface_names(body).index(push.interface)
                 found[own] = found[own] + small.by_motion(x)
     for load in loads:
-        if load.force.is_follower:  # it rotates with its marker
+        if load.force.is_follower:  # a follower force rotates with its marker
             six = small.now.source.read("load")[0, load.number]
             place = small.place(find_marker(small.system, f"force {load.force.name!r}", load.force.marker))
             turned = [place.rotation.mapped(-tilde(part)) for part in (six[:3], six[3:])]

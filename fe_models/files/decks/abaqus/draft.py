@@ -184,7 +184,7 @@ class Draft:
         with_section = np.concatenate(self.sectioned) if self.sectioned else np.zeros(0, np.int64)
         counts: dict[str, int] = {}
         for name, _, table in self.mesh.elements:
-            if not table[:, 1:].any():  # of an unknown type, so that its nodes have not been read
+            if not table[:, 1:].any():  # elements of an unknown type: their nodes have not been read
                 self.ledger.refuse(name, "this element is not known here", count=len(table))
                 continue
             n = int((~np.isin(table[:, 0], with_section)).sum())

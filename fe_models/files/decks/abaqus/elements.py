@@ -68,7 +68,7 @@ def read_element(here: str, block: DeckBlock, draft: Draft) -> None:
         rows = np.array(words, dtype=np.int64).reshape(-1, n + 1).tolist()
         key = block.parameters.get("ELSET", "").upper()
         if draft.points.setdefault(key, PointElements(name)).kind != name:
-            key = f"{key} {name}"  # no name of a set: found by its numbers
+            key = f"{key} {name}"  # not the name of a set: these elements are found by their numbers
         draft.points.setdefault(key, PointElements(name)).rows.update({row[0]: tuple(row[1:]) for row in rows})
     elif name in draft.mesh.ignored:
         draft.ledger.refuse(name, "this element is not known here", count=len(block.lines), line=block.line_number)

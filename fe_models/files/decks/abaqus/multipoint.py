@@ -89,7 +89,10 @@ def _straight(here: str, draft: Draft, numbers: list[int]) -> str:
 
 
 def _mean_rotation(here: str, draft: Draft, numbers: list[int]) -> str:
-    """Move the node of the angle to the centroid; it follows the mean displacement, and its rotation is the angle."""
+    """Convert MEANROT; return why it cannot be converted, or an empty text.
+
+    The last node, whose rotation is the mean angle, is moved to the centroid and follows the mean displacement.
+    """
     *listed, pilot = numbers
     nodes, counts = np.unique(np.array(listed, dtype=np.int64), return_counts=True)
     axis = _points(draft, [pilot])[0]

@@ -309,7 +309,8 @@ def _to_ground(block: DeckBlock, draft: Draft, of_set: PointElements) -> None:
         return
     value = numbers(block.lines[1])[0]
     first = component - component % 3
-    is_turned = TURNED in block.parameters  # with its instance: its axis takes all three components in basic axes
+    # in a rotated instance, the axis of the spring can have components along all three basic axes
+    is_turned = TURNED in block.parameters
     components = range(first, first + 3) if is_turned else (component,)
     along = MOTION_COMPONENTS[component] + (" along axes of its instance" if is_turned else "")
     for (node,) in of_set.rows.values():

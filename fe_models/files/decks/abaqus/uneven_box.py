@@ -47,7 +47,7 @@ def uneven_box(b: float, h: float, walls: tuple[float, ...]) -> UnevenBox | None
     b_i, h_i = b - t_1 - t_3, h - t_2 - t_4
     if min(b_i, h_i, *walls) <= 0:
         raise ValueError("expected walls above zero that leave a hole")
-    hole = np.array([(t_3 - t_1) / 2, (t_4 - t_2) / 2])  # its middle
+    hole = np.array([(t_3 - t_1) / 2, (t_4 - t_2) / 2])  # centre of the hole
     A, A_i = b * h - b_i * h_i, b_i * h_i
     centroid = -A_i * hole / A
     own, inner = -centroid, hole - centroid

@@ -97,7 +97,8 @@ def _nodal(here: str, block: DeckBlock, draft: Draft, step: str) -> None:
         nodes = draft.nodes_of(here, words[0])
         nodes = nodes[draft.mesh.rows_of(nodes) >= 0]
         component = int(words[1]) - 1
-        if len(nodes) == 1 and int(nodes[0]) in draft.rotations:  # its components are rotations of the reference node
+        # components of a rotation node are rotations of its reference node
+        if len(nodes) == 1 and int(nodes[0]) in draft.rotations:
             nodes, component = np.array([draft.rotations[int(nodes[0])]]), component + 3
         if not 0 <= component < 6 or not nodes.size:
             draft.ledger.note("*CLOAD", "at no node, or of no component 1 to 6", line=block.line_number)
@@ -189,7 +190,7 @@ _NONLINEAR = {
 #: keyword without blanks, which can be left out in CalculiX -> keyword
 _SQUEEZED = {name.replace(" ", ""): name for name in (*PARAMETERS, *HARMLESS, *_NONLINEAR)}
 SAME_PLANE = 1e-9  #: differences in z of plane elements divided by the size of the deck, up to which they are rounding
-_FIRST = ("ELEMENT", "TRANSFORM", "SURFACE")  #: keywords that are read before the others, which may precede them
+_FIRST = ("ELEMENT", "TRANSFORM", "SURFACE")  #: keywords that are read first, wherever they are in the deck
 _SILENT = ("STEP", "END STEP", "ENDSTEP", "NO ANALYSIS")
 
 

@@ -238,7 +238,7 @@ def _own_ends(model: NastranModel, card: Card, W: Array, R: Array, released: lis
 
 
 def _reduced(E: Array) -> list[tuple[Array, int]]:
-    """Return rows with the span of E, each with 1 in a column where all others have 0, and these columns."""
+    """Return rows with the span of E, each with its pivot column: 1 in this row, 0 in all other rows."""
     rows: list[tuple[Array, int]] = []
     E = E.copy()
     for k in range(len(E)):

@@ -96,7 +96,7 @@ class NastranModel:
         return self.last_point
 
     def add_equation(self, row: Row) -> None:
-        """Add an equation in basic axes without its zero terms; its first component is eliminated, so it stays."""
+        """Add an equation in basic axes without zero terms; the first term stays, as its component is eliminated."""
         terms = [(f"node_{node}", c, a) for k, ((node, c), a) in enumerate(row.items()) if a != 0 or k == 0]
         for node in dict.fromkeys(node for node, _ in row):
             self.groups[f"node_{node}"] = (node,)

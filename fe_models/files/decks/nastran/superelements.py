@@ -30,7 +30,7 @@ TOLERANCE = 1e-4
 SAME_SHAPE = 1e-4  #: difference of distances of SELOC points divided by the largest one, up to which they agree
 KINDS = ("PRIMARY", "REPEAT", "MIRROR")
 MAIN_CARDS = ("SEBULK", "SELOC", "SEMPLN", "SECONCT", "SEEXCLD")  #: cards that are allowed only in the main bulk data
-#: fields of a deck that are those of its parts, one after another
+#: fields of a deck that are concatenated from its parts
 JOINED = ("solids", "shells", "lines", "masses", "springs", "rigid", "couplings", "equations", "supports", "rods")
 
 Key = tuple[int, int]  #: number of the superelement, and of the grid point

@@ -17,7 +17,7 @@ YES = ("YES", "YESA", "NO")
 FIRST = 3  #: field number of the area of a PBEAM
 ALIKE = 1e-12  #: relative difference of a section property up to which stations are equal
 SIZES = 6  #: number of section properties: A, I1, I2, I12, J, NSM
-TORSION = 4  #: index of J among them
+TORSION = 4  #: index of J among these properties
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def cut_tapers(model: NastranModel) -> None:
         return
     last_element = max(card.integer(1, 0) for cards in model.cards.values() for card in cards if card.name[0] == "C")
     last_property = max(card.integer(1) for card in model.of(*PROPERTIES))
-    made: dict[int, list[int]] = {}  # property -> of its pieces
+    made: dict[int, list[int]] = {}  # property -> properties of its pieces
     untwisted = set()  # properties without J: pieces pass a torque on, and the last one ends without it
     for pid, (card, taper) in tapers.items():
         if card.name == "PBEAM" and not taper.sizes[:, TORSION].any() and model.plane is None:

@@ -69,7 +69,7 @@ def interface_loads(
     ModelError
         If a base holds several interfaces and rows depend on how its force is shared among them.
     """
-    A = la.block_diag(body.frame.axes, body.frame.axes).T  # mesh axes to those of B
+    A = la.block_diag(body.frame.axes, body.frame.axes).T  # from mesh axes to axes of B
 
     def columns(name: str) -> Array:
         wanted = [f"{name} {component}" for component in WRENCH]

@@ -37,7 +37,7 @@ def add_value(digest: Any, value: Any, seen: dict[int, bool]) -> None:
         seen[id(value)] = False
         add_function(digest, value.py_func, seen)
         seen[id(value)] = True
-    elif isinstance(value, FunctionType):  # overloaded for numba in its module, or registered with it by name
+    elif isinstance(value, FunctionType):  # its module overloads it for numba, or registers it by name
         seen[id(value)] = False
         add_function(digest, value, seen)
         seen[id(value)] = True

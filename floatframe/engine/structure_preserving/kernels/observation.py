@@ -65,7 +65,7 @@ def begin(model, work, memory, t):
     for k in range(work.state.w.shape[0]):
         work.state.w_start[k] = memory.w[k]
     work.states.rho = 1.0
-    for s in range(model.states.row.shape[0]):  # states are constant, with the rates from their laws
+    for s in range(model.states.row.shape[0]):  # hold the states constant; their laws give the rates
         z = memory.w[model.states.row[s]]
         work.state.w[model.states.row[s]], work.states.base[s] = z, z
         work.states.kappa[s], work.states.rate_base[s] = 0.0, 0.0

@@ -41,7 +41,7 @@ def turning_bias(th, w):
 
 @inner
 def quotient_dda(x):
-    """Return (d a'/dt)/t of x = t², a' = (t sin t - 2 (1 - cos t))/t⁴; its series below t = 2."""
+    """Return (d a'/dt)/t of x = t², a' = (t sin t - 2 (1 - cos t))/t⁴; by a series below t = 2."""
     if x > SERIES_UP_TO:
         t = math.sqrt(x)
         c = math.cos(t)
@@ -57,7 +57,7 @@ def quotient_dda(x):
 
 @inner
 def quotient_ddb(x):
-    """Return (d b'/dt)/t of x = t², b' = ((1 - cos t) - 3 (t - sin t)/t)/t⁴; its series below t = 2."""
+    """Return (d b'/dt)/t of x = t², b' = ((1 - cos t) - 3 (t - sin t)/t)/t⁴; by a series below t = 2."""
     if x > SERIES_UP_TO:
         t = math.sqrt(x)
         s = math.sin(t)

@@ -103,7 +103,7 @@ def begin_spin(tree, joints, memory, i, alpha_f, h):
 
 @inner
 def change_spin(tree, joints, step, i, by_theta, by_rate, by_acceleration):
-    """Add the correction of a spinning body's rotation columns to the iterate; theta changes by by_theta times it."""
+    """Add by_theta y, by_rate y, by_acceleration y to a spinning body's rotation; y: correction in `step`."""
     k, Q = first_rotation(tree, i), joints.Q[i]
     y = of_body(tree, i, Q, step[tree.unknown[k] :])
     omega, alpha = of_body(tree, i, Q, joints.rate[k:]), of_body(tree, i, Q, joints.acceleration[k:])

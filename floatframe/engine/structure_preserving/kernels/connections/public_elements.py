@@ -204,9 +204,9 @@ def potential_at(model, work, discrete, step, c, where, s):
 
 @inner
 def marker_of_whole(model, c):
-    """Return the first marker of element c that takes all kinds of its loads; -1 if there is none or it is on ground.
+    """Return the first marker at which element c applies all kinds of its loads, and whether it applies moments.
 
-    Also return whether the element acts by moments.
+    The marker is -1 if there is none, if the element has only one marker, or if one of its markers is on the ground.
     """
     a = model.connections.a[c]
     last = a + model.laws.head[model.connections.item[c], 0]
