@@ -9,19 +9,30 @@ things:
 (4) a name that another namespace of the same package offers is answered with that place.
 
 Type checkers and editors read the same stub.
+
+Another package adds to a `Registry` by entry points, without an edit here (docs/extending.md).
 """
 
 import ast
+import logging
 import os
 import sys
-from collections.abc import Iterator
+from collections import UserDict
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec, resolve_name
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
-__all__ = ["Door", "door_names", "names_of", "namespaces", "open_door", "places_of"]
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
+__all__ = ["Door", "Registry", "door_names", "names_of", "namespaces", "open_door", "places_of"]
+
+log = logging.getLogger(__name__)
+
+Entry = TypeVar("Entry")
 
 
 def open_door(module: str, error: str | None = None) -> None:
@@ -57,19 +68,13 @@ class Door(ModuleType):
             raise self.unknown_name_error(name)
         source, attribute = sources[name]
         found = import_module(source) if attribute is None else getattr(import_module(source), attribute)
-        if attribute is not None:
-            found = self.with_checks(name, found)
+        if attribute is not None and self.argument_error is not None:
+            from fe_models.foundation.records import at_door
+
+            module, _, error = self.argument_error.partition(":")
+            found = at_door(here, name, found, getattr(import_module(module), error))
         self.__dict__[name] = found
         return found
-
-    def with_checks(self, name: str, found: Any) -> Any:
-        """Return a public function with checks of its arguments; other objects are returned unchanged."""
-        if self.argument_error is None:
-            return found
-        from fe_models.foundation.records import at_door
-
-        module, _, error = self.argument_error.partition(":")
-        return at_door(self.__name__, name, found, getattr(import_module(module), error))
 
     def unknown_name_error(self, name: str) -> ImportError | AttributeError:
         """Return the error for a name that this module does not offer; it names the modules that offer it, if any."""
@@ -164,3 +169,79 @@ def tree_of(path: str) -> ast.Module:
     """Return the syntax tree of a file."""
     with open(path, encoding="utf-8") as file:
         return ast.parse(file.read())
+
+
+class Registry(UserDict[str, Entry]):
+    """Entries by name: those of this project, and entry points of installed packages, loaded when they are used.
+
+    Parameters
+    ----------
+    group
+        Group of the entry points, such as "cms.mode_sets".
+    own
+        Entries of this project; an entry point of the same name is left out, with a warning.
+    error
+        Raised if an entry point cannot be loaded or is of another kind; the message names its package.
+    kind
+        What an entry point names, for messages, such as "a function".
+    is_kind
+        Whether a loaded object is of this kind.
+    prefix
+        Put before the name of an entry point, such as "." for suffixes.
+    made
+        Makes the entry from the loaded object and the name of its package; None: the object itself.
+    """
+
+    def __init__(
+        self,
+        group: str,
+        own: Mapping[str, Entry],
+        error: type[Exception],
+        *,
+        kind: str = "a function",
+        is_kind: Callable[[Any], bool] = callable,
+        prefix: str = "",
+        made: Callable[[Any, str], Entry] | None = None,
+    ) -> None:
+        from importlib.metadata import entry_points  # slow, and a door is opened by every import of the packages
+
+        super().__init__(own)
+        self.group = group
+        self.error = error
+        self.kind = kind
+        self.is_kind = is_kind
+        self.made = made
+        self.not_loaded: dict[str, EntryPoint] = {}
+        for point in entry_points(group=group):
+            name = f"{prefix}{point.name}"
+            if name in self.data:
+                other = package_of(self.not_loaded[name]) if name in self.not_loaded else "this project"
+                log.warning("%s %r of %s: left out, %s has it", group, name, package_of(point), other)
+            else:
+                self.not_loaded[name] = point
+                self.data[name] = point  # type: ignore[assignment]  # until it is used
+
+    def __getitem__(self, name: str) -> Entry:
+        if name in self.not_loaded:
+            self.data[name] = self.loaded(name, self.not_loaded[name])
+            del self.not_loaded[name]
+        return self.data[name]
+
+    def loaded(self, name: str, point: "EntryPoint") -> Entry:
+        """Return the entry of an entry point."""
+        where = f"{self.group} {name!r} of {package_of(point)}"
+        try:
+            found = point.load()
+        except Exception as failure:
+            raise self.error(
+                f"{where}: {point.value} cannot be loaded: {type(failure).__name__}: {failure}; repair or remove the "
+                "package"
+            ) from failure
+        if not self.is_kind(found):
+            raise self.error(f"{where}: {point.value}: expected {self.kind}, got {found!r}")
+        return found if self.made is None else self.made(found, package_of(point))
+
+
+def package_of(point: "EntryPoint") -> str:
+    """Return name and version of the package of an entry point."""
+    return "a package without a name" if point.dist is None else f"package {point.dist.name} {point.dist.version}"

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from fe_models.entry_points import Registry
+from fe_models.door import Registry
 from fe_models.errors import FeModelsError, MeshError
 from fe_models.files.abaqus import read_abaqus
 from fe_models.files.cad.cad_units import CAD_SUFFIXES

@@ -18,7 +18,7 @@ from cms.modes.mode_sets.free_interface import craig_chang, dual_craig_bampton, 
 from cms.modes.mode_sets.given_columns import user_basis
 from cms.modes.mode_sets.krylov import krylov
 from cms.modes.mode_sets.multilevel import multilevel
-from fe_models.entry_points import Registry
+from fe_models.door import Registry
 
 __all__ = [
     "MODE_SETS",

@@ -80,7 +80,7 @@ def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedB
     if found is None or (not Q.is_formed and found.rounding > TRUSTED_ROUNDING):
         Q = orthonormal_basis(Q.combine(np.eye(Q.Z.shape[1])), Q.T, products, omega2_1)
         found = elastic_pencil(where, body, Q, products, condition, omega2_1)
-    X, Z, is_massive, omega2 = found.X, found.Z, found.is_massive, diagonal_within(Q.G_K, found.Z)
+    X, Z, is_massive, omega2 = found.X, found.Z, found.is_massive, dots(found.Z, Q.G_K @ found.Z)
     defect, Phi = found.defect, combined(X, Q.Z @ Z)
     if max(defect, found.rounding) > ORTHONORMAL_DEFECT:
         again, defect = normalised_again(Phi, is_massive, products)
@@ -88,7 +88,7 @@ def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedB
         G_K, own = gram_in_blocks(Phi, products.K), np.ix_(is_massive, is_massive)
         turn = np.eye(len(again))
         turn[own] = turn_to_diagonal(G_K[own])  # correcting the mass couples stiff modes
-        Z, Phi, omega2 = Z @ turn, combined(Phi, turn), diagonal_within(G_K, turn)
+        Z, Phi, omega2 = Z @ turn, combined(Phi, turn), dots(turn, G_K @ turn)
     rounding = rounding_of_energy(body, Phi)
     is_suspect = is_massive & (omega2 < SUSPECT_ENERGY * rounding)
     suspect = in_memory(Phi[:, is_suspect])
@@ -225,11 +225,6 @@ def elastic_part(body: FEBody, Q: Basis, condition: FrameCondition, omega2_1: fl
     return elastic_directions(C, E.T @ (body.K @ E) + omega2_1 * (E.T @ (body.M @ E)))
 
 
-def diagonal_within(G: Array, Z: Array) -> Array:
-    """Return the diagonal of Zᵀ G Z, (k,)."""
-    return np.asarray(np.einsum("kq,kq->q", Z, G @ Z))
-
-
 def free_elastic(Q: Basis, elastic: Array, condition: FrameCondition, omega2_1: float) -> Array:
     """Return squared elastic frequencies of the unsupported reduced body, ascending [1/s²], from its mean-axis pencil.
 
@@ -243,7 +238,7 @@ def free_elastic(Q: Basis, elastic: Array, condition: FrameCondition, omega2_1: 
     G_M = Q.G_M - Y.T @ np.linalg.solve(rigid_mass, Y)
     A_K = within(Q.G_K, elastic)
     Z, is_massive = elastic_eigenvectors(A_K, within(G_M, elastic), omega2_1)
-    return np.sort(diagonal_within(A_K, Z)[is_massive])
+    return np.sort(dots(Z, A_K @ Z)[is_massive])
 
 
 # rigid-body motion in the span of columns, found from the rigid-body vectors themselves (docs/theory.md §3) -----------

@@ -16,7 +16,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TypeGuard
 
-from fe_models.entry_points import Registry
+from fe_models.door import Registry
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.model.elements.element import Element

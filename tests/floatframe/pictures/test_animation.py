@@ -291,7 +291,7 @@ def test_bodies_that_do_not_fit_the_motion_are_refused(body):
     times = film_times(trajectory.t, fps=5, speed=1.0)
     with pytest.raises(ResultsError, match="no body 'rodd'; it has rod"):
         motion_scene(trajectory, {"rodd": body}, times)
-    with pytest.raises(ResultsError, match="has 3 modes, but its motion 5"):
+    with pytest.raises(ResultsError, match="has 3 modes, but its motion has 5"):
         motion_scene(trajectory, {"rod": replace(synthetic_reduced_body(n_q=3), surface=TETRAHEDRON)}, times)
 
 

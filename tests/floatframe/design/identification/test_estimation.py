@@ -116,7 +116,7 @@ def test_real_bodies_fit_as_well_and_no_real_prior_is_refused(robot, truth):
     assert real.excess < 0.1  # 48 parameters out of 600 rows
     assert [body.mass for body in real.system.bodies] == list(real.phi[:60:10])
     prior[10:20] = [1.0, 0, 0, 0, 1.0, 0, 0, 1.0, 0, 3.0]
-    with pytest.raises(ModelError, match="'link2': the prior is that of no real body"):
+    with pytest.raises(ModelError, match="'link2': the prior is not a real body"):
         real_parameters(made, prior=prior)
 
 
