@@ -1,11 +1,13 @@
 """Results of a comparison of mode sets: plain numbers and sentences, which the reports present."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 from cms.assessment.quality.record import QualityRecord
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.documents.table import Table
 from fe_models.foundation.units import Units
 
 __all__ = ["Comparison", "Drawing", "FullResults", "Point", "SetResult"]
@@ -105,3 +107,20 @@ class Comparison:
             if result.name == name:
                 return result
         raise KeyError(name)
+
+    def to_table(self) -> Table:
+        """Return the values of all records, one row for every set and number of modes; non-finite values are missing.
+
+        A set that could not be made has one row, with the reason as its verdict.
+        """
+        names = list(dict.fromkeys(record.name for result in self.sets for p in result.points for record in p.records))
+        rows: list[tuple[Any, ...]] = []
+        for result in self.sets:
+            if not result.points:
+                rows.append((result.name, None, None, None, None, result.sentence, *[None] * len(names)))
+            for point in result.points:
+                values = {record.name: record.value for record in point.records if math.isfinite(record.value)}
+                verdict = "good enough" if point.is_good else "not good enough"
+                counts = (point.n_modes, point.n_columns, point.n_q, len(point.dropped))
+                rows.append((result.name, *counts, verdict, *map(values.get, names)))
+        return Table.of_rows(("set", "n_modes", "n_columns", "n_coordinates", "n_dropped", "verdict", *names), rows)

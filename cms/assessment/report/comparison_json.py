@@ -1,15 +1,13 @@
-"""Comparison as plain types, with every number that the other reports show, and as a table."""
+"""Comparison as plain types, with every number that the other reports show."""
 
 import json
-import math
 from dataclasses import asdict
 from typing import Any
 
 from cms.assessment.compare.comparison import Comparison, Point, SetResult
 from cms.assessment.quality.record import plain
-from fe_models.foundation.documents.table import Table
 
-__all__ = ["FORMAT", "comparison_json", "comparison_record", "comparison_table"]
+__all__ = ["FORMAT", "comparison_json", "comparison_record"]
 
 
 FORMAT = "cms-comparison"
@@ -67,23 +65,3 @@ def point_record(point: Point) -> dict[str, Any]:
         "is_good": point.is_good,
         "records": [record.as_dict() for record in point.records],
     }
-
-
-def comparison_table(comparison: Comparison) -> Table:
-    """Return the values of all records, one row for every set and number of modes; non-finite values are missing.
-
-    A set that could not be made has one row, with the reason as its verdict.
-    """
-    names = list(
-        dict.fromkeys(record.name for result in comparison.sets for p in result.points for record in p.records)
-    )
-    rows: list[tuple[Any, ...]] = []
-    for result in comparison.sets:
-        if not result.points:
-            rows.append((result.name, None, None, None, None, result.sentence, *[None] * len(names)))
-        for point in result.points:
-            values = {record.name: record.value for record in point.records if math.isfinite(record.value)}
-            verdict = "good enough" if point.is_good else "not good enough"
-            counts = (point.n_modes, point.n_columns, point.n_q, len(point.dropped))
-            rows.append((result.name, *counts, verdict, *map(values.get, names)))
-    return Table.of_rows(("set", "n_modes", "n_columns", "n_coordinates", "n_dropped", "verdict", *names), rows)

@@ -166,7 +166,7 @@ def output_folder(path: Path) -> Path:
 
 def write_report(folder: Path, comparison: "Comparison", stills: int) -> list[Path]:
     """Write HTML, JSON, CSV and, if reportlab is installed, PDF; return their paths."""
-    from cms.assessment.report import comparison_document, comparison_json, comparison_table
+    from cms.assessment.report import comparison_document, comparison_json
     from fe_models.foundation.documents.write import document_content
     from fe_models.foundation.paths import replace_files
 
@@ -174,7 +174,7 @@ def write_report(folder: Path, comparison: "Comparison", stills: int) -> list[Pa
     contents = {
         folder / FILES["html"]: document_content(document, ".html"),
         folder / FILES["json"]: comparison_json(comparison).encode(),
-        folder / FILES["csv"]: comparison_table(comparison).content(".csv"),
+        folder / FILES["csv"]: comparison.to_table().content(".csv"),
     }
     if find_spec("reportlab") is not None:
         contents[folder / FILES["pdf"]] = document_content(document, ".pdf")

@@ -17,7 +17,7 @@ from cms.assessment.compare.compare import compare_sets
 from cms.assessment.compare.comparison import SetResult
 from cms.assessment.compare.verdicts import DECIDING, crossings
 from cms.assessment.quality.limits import LIMITS
-from cms.assessment.report import comparison_document, comparison_json, comparison_table
+from cms.assessment.report import comparison_document, comparison_json
 from cms.assessment.report.charts import convergence_chart, deformation_chart, mac_chart, response_chart
 from cms.assessment.report.formatting import factor, share, signed_percent
 from cms.assessment.report.palette import COLORS, style_of
@@ -89,7 +89,7 @@ def test_the_json_has_the_numbers_of_the_records(comparison):
 
 
 def test_the_csv_has_one_row_a_point_with_the_numbers_of_the_records(comparison):
-    rows = list(csv.DictReader(io.StringIO(comparison_table(comparison).content(".csv").decode())))
+    rows = list(csv.DictReader(io.StringIO(comparison.to_table().content(".csv").decode())))
     points = [(result, point) for result in comparison.sets for point in result.points]
     failed = [row for row in rows if not row["n_modes"]]
     assert [row["set"] for row in failed] == ["benfield-hruda"]
