@@ -44,7 +44,7 @@ def test_bodies_have_their_motion_and_the_places_on_them(motion):
         rod.interface(name).position, ff.results.interface_motion(motion, "rod", rod.reduced, name).position
     )
     assert rod.displacement(-1).shape == (len(rod.reduced.nodes), 3)
-    with pytest.raises(ResultsError, match="'bob': it is rigid"):
+    with pytest.raises(ResultsError, match="body 'bob' is rigid"):
         motion.body("bob").interface("end")
 
 

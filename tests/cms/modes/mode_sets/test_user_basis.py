@@ -157,9 +157,9 @@ def test_rows_that_may_be_those_of_mesh_or_coupled_body_must_be_told(pinned, fre
 def test_rows_that_look_like_the_other_dofs_are_refused(pinned, free_modes):
     body = couple(pinned)
     V, _ = free_modes
-    with pytest.raises(ModeSetError, match=r'columns_over = "coupled": in this order.*give columns_over = "mesh"'):
+    with pytest.raises(ModeSetError, match=r'columns_over = "coupled": with these dofs.*give columns_over = "mesh"'):
         user_basis(body, columns=V, columns_over="coupled")
-    with pytest.raises(ModeSetError, match=r'columns_over = "mesh": in this order.*give columns_over = "coupled"'):
+    with pytest.raises(ModeSetError, match=r'columns_over = "mesh": with these dofs.*give columns_over = "coupled"'):
         user_basis(body, columns=coupled_field(body, V).columns, columns_over="mesh")
     # columns that do not tell either way are taken as they are said to be
     assert user_basis(body, columns=np.eye(66), columns_over="coupled").columns.shape == (66, 66)

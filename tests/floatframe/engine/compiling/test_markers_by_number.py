@@ -72,7 +72,7 @@ def test_a_node_that_is_an_interface_is_that_interface(reduced, tmp_path):
 @pytest.mark.parametrize(
     ("node", "words"),
     [
-        (1010, r"node 1010 of body 'rod' is no interface.*nodes = \[1010\].*root, tip"),
+        (1010, r"node 1010 of body 'rod' is not an interface.*nodes = \[1010\].*root, tip"),
         (7, "no node 7"),
     ],
 )

@@ -124,7 +124,7 @@ formulation = "relative"
     assert motion.head.run["integrator"] == "RelativeGeneralizedAlpha"
     assert motion.drift("hinge").distance.max() < 1e-15
     path.write_text(text + 'scheme = "energy-momentum"\n')
-    with pytest.raises(SystemFileError, match="energy-momentum works in absolute coordinates alone"):
+    with pytest.raises(SystemFileError, match="energy-momentum works only in absolute coordinates"):
         read_system(path)
 
 
