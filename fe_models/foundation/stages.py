@@ -36,7 +36,7 @@ class Stages:
 
 
 @contextmanager
-def announced_compilation(log: logging.Logger, message: str) -> Iterator[None]:
+def announced_compilation(log: logging.Logger, code: str, duration: str) -> Iterator[None]:
     """Log a warning when numba begins to compile inside the block; code that it loads from its cache does not count."""
     from numba.core.event import Event, Listener, install_listener
 
@@ -47,9 +47,9 @@ def announced_compilation(log: logging.Logger, message: str) -> Iterator[None]:
             if not self.is_made:
                 self.is_made = True
                 log.warning(
-                    "%s is being compiled, once on this machine; the command `floatframe prepare` does it in advance",
-                    message,
-                )
+                    "compiling %s, once on this machine, %s; the command `floatframe prepare` does it in advance",
+                    code, duration,
+                )  # fmt: skip
 
         def on_end(self, event: Event) -> None:
             pass

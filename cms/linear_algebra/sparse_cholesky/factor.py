@@ -156,7 +156,7 @@ class CholeskyFactor:
         if not definite:
             raise FactorizationError("cholesky: expected a positive definite matrix; take superlu for others")
         self.n = lower.shape[0]
-        with announced_compilation(log, "the code of the Cholesky factorisation (about 20 s)"):
+        with announced_compilation(log, "the code of the Cholesky factorisation", "about 20 s"):
             self._make(lower, fronts, on_disk, folder)
 
     def _make(self, lower: sp.csc_array, fronts: Fronts | None, on_disk: bool, folder: Path | None) -> None:

@@ -11,7 +11,7 @@ from numba import types
 
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.stages import announced_compilation
-from floatframe.engine.kernels.compiler.choice import compiler, words
+from floatframe.engine.kernels.compiler.choice import compiler, is_lean, words
 from floatframe.engine.kernels.compiler.compilation import kept_entry
 from floatframe.engine.kernels.compiler.sources import source_digest
 from floatframe.engine.kernels.compiler.structure import converter, table_of_numbers
@@ -156,7 +156,9 @@ class CompiledEntry:
     def __call__(self, *records: Any, memory: Any = NO_MEMORY, rows: Any = NO_ROWS, **order: float) -> Outcome:
         """Carry out a request; fields that are not given are zero, and all arrays stay alive until it returns."""
         if not self.is_ready:
-            with announced_compilation(log, f"the code of motions (about 15 s; {words()})"):
+            with announced_compilation(
+                log, f"the code of motions ({words()})", "about 15 s" if is_lean else "some minutes"
+            ):
                 self.prepare()
         ordered, numbers = table_of_numbers(ORDER, order)
         outcome = self.compiled(*(record.table for record in (*records, memory, rows)), ordered)

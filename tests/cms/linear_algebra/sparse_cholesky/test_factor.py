@@ -266,4 +266,4 @@ def test_the_compilation_of_the_kernels_is_announced_once(monkeypatch, caplog):
     assert caplog.messages == []
     monkeypatch.setattr("cms.linear_algebra.sparse_cholesky.factor.analyse", compiled_before)
     CholeskyFactor(A).close()
-    assert [message[:38] for message in caplog.messages] == ["the code of the Cholesky factorisation"]
+    assert [message[:48] for message in caplog.messages] == ["compiling the code of the Cholesky factorisation"]
