@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
 
 import floatframe as ff
 from floatframe.integrators.registry import CLASSES
@@ -24,6 +25,8 @@ pytestmark = pytest.mark.filterwarnings("ignore:.*linear frames")
 GRAVITY = ff.Gravity((0.0, -9.81, 0.0))
 TIP, POST = ff.Marker("arm", position=(0.6, 0.1, 0.0)), ff.Marker(ff.GROUND, position=(1.9, -0.4, 0.3))
 LENGTH, STIFFNESS = 0.5, 20.0
+INCLINED = Rotation.from_rotvec((0.0, 0.0, 0.2)).as_matrix()
+ANY_AXES = Rotation.from_rotvec((0.3, 0.8, -0.5)).as_matrix()
 T_END, H = 0.1, 2e-3
 
 
@@ -54,8 +57,11 @@ KINDS = types.SimpleNamespace()
 
 
 def slot(on_rod, *, is_own, motions):
-    """Return the pin in the slot, or the planar joint whose second coordinate is minus the distance along it."""
-    ends = ff.Marker(ff.GROUND, position=(0.1, 0.0, 0.0)), on_rod
+    """Return the pin in the slot, or the planar joint whose second coordinate is minus the distance along it.
+
+    The slot is inclined, and the axis of the pin has another direction in the axes of marker B than in those of A.
+    """
+    ends = ff.Marker(ff.GROUND, position=(0.1, 0.0, 0.0), triad=INCLINED), replace(on_rod, triad=ANY_AXES)
     if is_own:
         return KINDS.joint("pin", *ends, motions=motions)
     names = {"distance": "second", "angle": "angle"}
