@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 import floatframe as ff
 from floatframe.integrators.registry import CLASSES
 from floatframe.model.functions.time_functions import harmonic
+from floatframe.model.joints.joint import Column
 from tests.floatframe.engine.tree.mechanisms import beam
 from tests.root import ROOT
 
@@ -375,12 +376,33 @@ class NoRows(ff.model.joints.Joint):
     """A joint that has forgotten its rows."""
 
 
+def with_columns(*names):
+    """Return the machine with a pin that has only the columns of these names, or another one too."""
+    pin = machine(is_own=True).joints[0]
+
+    def columns(self, A_a, A_b):
+        found = {column.name: column for column in super(kind, self).columns(A_a, A_b)}
+        return tuple(found.get(name, Column(name, tau=self.axis, unit="m")) for name in names)
+
+    kind = type("WrongColumns", (type(pin),), {"columns": columns})
+    system = machine(is_own=True, has_force=False)
+    return replace(system, joints=[kind("pin", pin.marker_a, pin.marker_b), system.joints[1]])
+
+
 REFUSALS = {
     "relative_model": (lambda _: ff.analyses.relative_model(cord_alone()), "element 'cord'"),
     "generate": (lambda _: ff.design.generate(cord_alone()), "element 'cord'"),
     "generate_fmu": (lambda folder: ff.design.generate_fmu(cord_alone(), folder / "cord.fmu"), "element 'cord'"),
     "robot_of_system": (lambda _: ff.files.robot_of_system(machine(is_own=True, has_force=False)), "joint 'pin'"),
     "no joint": (lambda _: ff.System([ff.RigidBody("b", 1.0, np.eye(3))], [object()]), "expected .* a Joint"),
+    "a column too few": (
+        lambda _: ff.analyses.relative_model(with_columns("angle")),
+        r"joint 'pin': columns: expected 2, because its rows are 4 constraints, got 1 \(angle\)",
+    ),
+    "a column too many": (
+        lambda _: ff.static_equilibrium(with_columns("distance", "angle", "up"), formulation="relative"),
+        r"got 3 \(distance, angle, up\)",
+    ),
     "no rows": (lambda _: NoRows().rows(None, None, None), "NoRows: expected a method rows"),
 }
 

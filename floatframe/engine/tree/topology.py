@@ -19,9 +19,11 @@ from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.kernels.model import COUPLER, JOINT, Model
 from floatframe.engine.kernels.records import filled
 from floatframe.engine.tree.kernels.tree import COLUMN, FAR_MODE, NEAR_MODE, Tree
+from floatframe.errors import ModelError
 from floatframe.model.functions.time_functions import TimeFunction
 from floatframe.model.joints import SlidingJoint
 from floatframe.model.joints.joint import MOVES_IN_A, SIDE_B, TURNS_IN_B, Column
+from floatframe.model.joints.rows import is_held
 from floatframe.model.rotations import rotation_matrix
 from floatframe.model.system import System
 
@@ -132,8 +134,22 @@ def charts_of(system: System, compiled: CompiledSystem) -> dict[int, tuple[Colum
             model.joint_forces.coefficient[model.rows.force0[row] : model.rows.force1[row]].any() for row in rows
         )
         if columns is not None and not has_normal_friction:
+            require_freedoms(compiled, k, columns)
             charts[k] = columns
     return charts
+
+
+def require_freedoms(compiled: CompiledSystem, joint: int, columns: tuple[Column, ...]) -> None:
+    """Raise `ModelError` if the constraints of a joint and its columns are not 6 together."""
+    model = compiled.model
+    rows = slice(int(model.connections.w0[joint]), int(model.connections.w0[joint + 1]))
+    n_constraints = int((is_held(model.rows.kind[rows]) & (model.rows.motion[rows] < 0)).sum())
+    if n_constraints + len(columns) != 6:
+        names = ", ".join(column.name for column in columns) or "none"
+        raise ModelError(
+            f"joint {compiled.joint_names[joint]!r}: columns: expected {6 - n_constraints}, because its rows are "
+            f"{n_constraints} constraints, got {len(columns)} ({names})"
+        )
 
 
 def spanning_tree(system: System, model: Model, charts: dict[int, tuple[Column, ...]]) -> list[Branch]:
