@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from fe_models.assembly.constraints import Constraint, MeanMotion, NodeEquation, RigidNodes
 from fe_models.assembly.join import Joined, Part, join
 from fe_models.assembly.lumped import lumped_beams, lumped_shells
-from fe_models.assembly.model import FEModel
+from fe_models.assembly.model import FEModel, ModelTables
 from fe_models.assembly.rods import rod_body
 from fe_models.assembly.tables.attachments import (
     followers_of,
@@ -65,6 +65,14 @@ __all__ = ["assemble"]
 NO_NODES = np.zeros(0, dtype=np.int64)
 OnReport = Callable[[Any], None] | None
 BEAM_TYPES = ("line", "line3")
+ATTACHED = ("masses", "springs", "links")
+#: tables of elements and attachments that a mesh of one kind of elements takes
+TABLES_OF_MESH: dict[type, tuple[str, ...]] = {
+    Mesh: ("solids",),
+    ShellMesh: ("shells", "sections", *ATTACHED),
+    LineMesh: ("sections", *ATTACHED),
+}
+COMMON_TABLES = ("materials", "interfaces", "load_cases")  #: tables that every mesh takes
 
 
 def assemble(
@@ -104,9 +112,13 @@ def assemble(
     stages = stages or Stages()
     if isinstance(model.mesh, RawMesh):
         return _joined_body(model, stages, on_report)
+    _require_one_kind(model)
     tables, mesh = model.tables, model.mesh
     if isinstance(mesh, Mesh):
-        ((rule, of_group),) = solid_properties(tables.solids, tables.materials, model.mass).items()
+        rules = solid_properties(tables.solids, tables.materials, model.mass)
+        if len(rules) != 1:
+            raise BodyError(f"model {model.name!r}: solids: a Mesh takes one integration and mass, got {len(rules)}")
+        ((rule, of_group),) = rules.items()
         body, mesh = _solid_body(
             model, mesh, of_group.get("all", of_group), model.name, stages, on_report, rule, places=tables.interfaces,
             is_checked=is_checked, ranks=ranks,
@@ -127,6 +139,25 @@ def assemble(
         return body
     with stages("assemble"):
         return body.with_load_cases(*load_cases_of(tables.load_cases, body, mesh))
+
+
+def _require_one_kind(model: FEModel) -> None:
+    """Raise `BodyError` if a table or field has no effect on the mesh, which has one kind of elements."""
+    where = f"model {model.name!r}"
+    kind = next((each for each in TABLES_OF_MESH if isinstance(model.mesh, each)), None)
+    if kind is None:
+        expected = ", ".join(("RawMesh", *(each.__name__ for each in TABLES_OF_MESH)))
+        raise BodyError(f"{where}: mesh: expected one of {expected}, got {type(model.mesh).__name__}")
+    for key in ModelTables.model_fields:
+        if key not in (*COMMON_TABLES, *TABLES_OF_MESH[kind]) and getattr(model.tables, key):
+            raise BodyError(
+                f"{where}: {key}: a {kind.__name__} takes {', '.join(TABLES_OF_MESH[kind])} only; remove the "
+                "tables, or give a RawMesh"
+            )
+    if model.plane is not None:
+        raise BodyError(f"{where}: plane: belongs to a RawMesh; remove it, and call fe_models.planar(couple(body))")
+    if model.mass not in (None, "consistent") and kind is not Mesh:
+        raise BodyError(f"{where}: mass: a {kind.__name__} has consistent mass, got {model.mass!r}; give a RawMesh")
 
 
 def _joined_body(model: FEModel, stages: Stages, on_report: OnReport) -> FEBody:

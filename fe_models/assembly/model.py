@@ -19,7 +19,7 @@ from fe_models.assembly.tables.attachments import (
     SpringSection,
 )
 from fe_models.assembly.tables.beams import PLANES, BeamSection, RodSection
-from fe_models.assembly.tables.materials import MaterialSection, SolidSection, check_material
+from fe_models.assembly.tables.materials import MaterialSection, SolidSection, check_all, check_material
 from fe_models.assembly.tables.places import InterfaceSection, LoadCaseSection
 from fe_models.assembly.tables.shells import ShellSection, check_layups
 from fe_models.foundation.errors import ArgumentError, BodyError
@@ -152,6 +152,8 @@ def check_properties(tables: ModelTables) -> None:
     for kind, sections in properties.items():
         for name, section in sections.items():
             check_material(f"{kind}.{name}", section.material, tables.materials)
+    for kind, key in (("solids", "cells"), ("shells", "cells"), ("sections", "lines"), ("rods", "lines")):
+        check_all(kind, getattr(tables, kind), key)
     for name, material in tables.materials.items():
         if "cells" in material.model_fields_set:
             raise ValueError(

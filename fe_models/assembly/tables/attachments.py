@@ -214,9 +214,12 @@ def springs_between(mesh: Any, tables: Mapping[str, SpringSection]) -> "list[Spr
 
 
 def rigid_links(mesh: Any, tables: Mapping[str, LinkSection]) -> "list[RigidLink]":
-    """Return the rigid links on a mesh, in the order of the tables."""
+    """Return the rigid links on a mesh, in the order of the tables; raise `BodyError` if one leaves components free."""
     from fe_models.elements.beams.attachments import RigidLink
 
+    for name, table in tables.items():
+        if set(table.components) != set(ALL):
+            raise BodyError(f"links.{name}.components: belong to a whole deck; remove them, all components follow")
     return [
         RigidLink(one_node(mesh, f"links.{name}.node", table.node), followers_of(mesh, name, table))
         for name, table in tables.items()

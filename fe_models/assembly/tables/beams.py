@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from fe_models.assembly.tables.materials import MaterialSection, Name, check_material, isotropic_of
+from fe_models.assembly.tables.materials import MaterialSection, Name, check_all, check_material, isotropic_of
 from fe_models.foundation.toml_file import Names, Table, Vector3, choice
 from fe_models.foundation.words import nearest
 
@@ -138,10 +138,7 @@ def check_beams(sections: Mapping[str, BeamSection], others: Mapping[str, Any], 
             )
     for name, section in sections.items():
         check_material(f"sections.{name}", section.material, materials)
-        if section.lines == ("all",) and len(sections) > 1:
-            raise ValueError(
-                f'sections.{name}: lines = "all", but there are {len(sections)} sections; name the lines of each'
-            )
+    check_all("sections", sections, "lines")
 
 
 def beam_properties(

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from fe_models.body.material import AnyMaterial, Material
 
 __all__ = [
-    "MaterialSection", "Name", "SolidSection", "check_material", "isotropic_of", "material_of",
+    "MaterialSection", "Name", "SolidSection", "check_all", "check_material", "isotropic_of", "material_of",
     "solid_properties",
 ]  # fmt: skip
 
@@ -153,6 +153,15 @@ def check_material(where: str, material: str | None, materials: Mapping[str, Any
         raise ValueError(f"{where}.material: missing; there are {len(materials)} materials, name one")
     if material is not None and material not in materials:
         raise ValueError(f'{where}.material = "{material}": there is no such material{nearest(material, materials)}')
+
+
+def check_all(kind: str, tables: Mapping[str, Any], key: str) -> None:
+    """Raise `ValueError` if a table of "all" cells or lines (`key`) is not the only one of its kind."""
+    for name, table in tables.items():
+        if "all" in getattr(table, key) and len(tables) > 1:
+            raise ValueError(
+                f'{kind}.{name}: {key} = "all", but there are {len(tables)} tables; name the {key} of each'
+            )
 
 
 class SolidSection(Table):

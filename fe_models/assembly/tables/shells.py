@@ -9,6 +9,7 @@ from fe_models.assembly.tables.beams import BeamSection
 from fe_models.assembly.tables.materials import (
     MaterialSection,
     Name,
+    check_all,
     check_material,
     isotropic_of,
     material_of,
@@ -79,11 +80,7 @@ def check_shells(
     if body.plane is not None:
         raise ValueError("body.plane: belongs to beams alone; remove it")
     check_layups(shells, materials)
-    for name, shell in shells.items():
-        if shell.cells == ("all",) and len(shells) > 1:
-            raise ValueError(
-                f'shells.{name}: cells = "all", but there are {len(shells)} tables; name the cells of each'
-            )
+    check_all("shells", shells, "cells")
     for name, section in sections.items():
         if section.lines == ("all",):
             raise ValueError(f"sections.{name}.lines: missing; which group of lines is the stiffener?")

@@ -1,9 +1,12 @@
 """A model given by tables is the body that the functions for one kind of elements return."""
 
+import pytest
 from numpy.testing import assert_array_equal
 
 import fe_models as fm
 from fe_models.assembly.model import FEModel
+from fe_models.errors import BodyError
+from tests.bodies import box_mesh
 
 STEEL = {"young": 210e9, "poisson": 0.3, "density": 7850.0}
 MATERIAL = fm.Material("steel", E=210e9, nu=0.3, rho=7850.0)
@@ -35,3 +38,42 @@ def test_a_model_of_lines_is_the_body_of_its_beams():
     )
     expected = fm.beam_body(mesh, fm.beams.BeamProperty(fm.beams.Circle(0.01), MATERIAL), name="rod", units=UNITS)
     require_equal(fm.assemble(model), expected)
+
+
+LINES = fm.beams.straight_line((0, 0, 0), (1, 0, 0), 4)
+ROUND = {"shape": "circle", "radius": 0.01}
+RULES = {"left": "full", "right": "incompatible"}
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            {"rods": {"r": {"lines": "all", "area": 1e-4}}},
+            r"rods: a LineMesh takes sections, masses, springs",
+        ),
+        (
+            {"couplings": {"c": {"node": "end", "members": {"start": 1.0}}}},
+            r"couplings: a LineMesh takes",
+        ),
+        ({"plane": "xy"}, r"plane: belongs to a RawMesh"),
+        ({"mass": "lumped"}, r"mass: a LineMesh has consistent mass, got 'lumped'"),
+        (
+            {"links": {"l": {"node": "start", "followers": "end", "components": ["ux"]}}},
+            r"links\.l\.components: belong to a whole deck",
+        ),
+        ({"sections": {"s": ROUND, "t": ROUND}}, r'sections\.s: lines = "all", but there are 2 tables'),
+        ({"mesh": None}, r"mesh: expected one of RawMesh, Mesh, ShellMesh, LineMesh, got NoneType"),
+    ],
+)
+def test_what_a_mesh_of_lines_cannot_take_is_refused(change, message):
+    given = {"mesh": LINES, "units": "m-kg-s", "materials": {"steel": STEEL}, "sections": {"s": ROUND}} | change
+    with pytest.raises(BodyError, match=message):
+        fm.assemble(FEModel.of("rod", **given))
+
+
+def test_two_formulations_on_one_mesh_of_solids_are_refused():
+    halves = {name: {"cells": f"{name} half", "integration": rule} for name, rule in RULES.items()}
+    model = FEModel.of("box", box_mesh(2, 1, 1), units="m-kg-s", materials={"steel": STEEL}, solids=halves)
+    with pytest.raises(BodyError, match="solids: a Mesh takes one integration and mass, got 2"):
+        fm.assemble(model)
