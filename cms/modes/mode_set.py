@@ -5,6 +5,7 @@ The functions that make mode sets (`cms/modes/mode_sets`) assemble them from blo
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import count
 from types import MappingProxyType
 from typing import Annotated, Any, Protocol
 
@@ -88,18 +89,25 @@ class ModeSet:
             beside(self.columns, other.columns),
             (*self.labels, *other.labels),
             np.concatenate([self.frequencies, other.frequencies]),
-            named_by_set(self, other, [self.options, other.options]),
+            named_by_set([self, other], [self.options, other.options]),
             (*self.groups, *other.groups),
-            named_by_set(self, other, [self.data, other.data]),
+            named_by_set([self, other], [self.data, other.data]),
         )
 
 
-def named_by_set(first: ModeSet, second: ModeSet, entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the entries of two sets in one dictionary; names that both have get the name of their set in front."""
-    own, other = entries
-    twice = own.keys() & other.keys()
-    found = {f"{first.name} {key}" if key in twice else key: value for key, value in own.items()}
-    return found | {f"{second.name} {key}" if key in twice else key: value for key, value in other.items()}
+def named_by_set(sets: Sequence[ModeSet], entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the entries of sets in one dictionary, each with the name of its set in front; a second one is numbered.
+
+    Entries of a sum have such names already.
+    """
+    found: dict[str, Any] = {}
+    for each, own in zip(sets, entries, strict=True):
+        names = tuple(f"{name} " for name in each.name.split(" + "))
+        for key, value in own.items():
+            named = key if key.startswith(names) else f"{each.name} {key}"
+            numbered = (f"{named} {k}" for k in count(2))
+            found[named if named not in found else next(name for name in numbered if name not in found)] = value
+    return found
 
 
 # blocks of columns of one family -------------------------------------------------------------------------------------

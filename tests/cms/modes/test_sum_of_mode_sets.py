@@ -25,6 +25,17 @@ def test_the_sum_has_the_columns_of_both_sets(body):
     assert both.options["normal n_modes"] == "2"
 
 
+def test_a_sum_has_the_options_of_every_set(body):
+    """Also of two sets of one name, and of a third set; none of them is an option of the sum."""
+    first, second = cms.craig_bampton(body, 3), cms.craig_bampton(body, 5)
+    options = (first + second + cms.modes.normal_modes(body, 2)).options
+    assert options["craig-bampton n_modes"] == "3"
+    assert options["craig-bampton n_modes 2"] == "5"
+    assert options["normal n_modes"] == "2"
+    assert "n_modes" not in options
+    assert len(options) == len(first.options) + len(second.options) + len(cms.modes.normal_modes(body, 2).options)
+
+
 def test_constraint_and_free_modes_give_exact_free_frequencies(body):
     """The columns of Guyan's set alone lie above them; those of the sum span the free modes."""
     free = cms.modes.normal_modes(body, 3)
