@@ -124,7 +124,7 @@ def export_command(
         "sensors": sensors, "every": every, "effort": effort, "velocity": velocity, "fmi": fmi, "inputs": inputs,
         "outputs": outputs, "step": step, "parameters": parameters, "what": what, "name": name, "json": json,
     }  # fmt: skip
-    given = {name: value for name, value in options.items() if value not in (None, [], False)}
+    given = {name: value for name, value in options.items() if not (value is None or value == [] or value is False)}
     require_options(key, given, {each.name: each.opts[0] for each in context.command.params if each.name in options})
     write(file, output, **given)
 
@@ -258,7 +258,6 @@ def write_surfaces(file: Path, output: Path | None, *, every: int = 1) -> None:
 
 def write_robot(file: Path, output: Path | None, *, effort: float | None = None, velocity: float | None = None) -> None:
     """Write a tree of rigid bodies as a URDF robot, with its surfaces; what URDF does not support is listed."""
-    from fe_models.foundation.paths import replace_files
     from floatframe.errors import UrdfError
     from floatframe.files.importers.robot import JointLimits
     from floatframe.files.importers.system_robot import robot_of_system, urdf_text
@@ -269,12 +268,7 @@ def write_robot(file: Path, output: Path | None, *, effort: float | None = None,
     limits = {joint.name: JointLimits(effort=effort, velocity=velocity) for joint in model.joints}
     made = robot_of_system(model, limits=limits)
     files = {path: urdf_text(made.robot).encode(), **{path.parent / name: data for name, data in made.meshes.items()}}
-    try:
-        for each in files:
-            each.parent.mkdir(parents=True, exist_ok=True)
-        replace_files(files)
-    except OSError as error:
-        raise UrdfError(f"{path}: cannot be written: {error.strerror}") from error
+    write_files(files, path, UrdfError, inputs=(file, *model.files))
     for note in made.notes:
         typer.echo(f"note: omitted: {note}", err=True)
     for each in files:
@@ -338,7 +332,6 @@ def write_code(
     parameters: Sequence[str] = (), json: bool = False,
 ) -> None:  # fmt: skip
     """Write the equations of a tree as code, which contains the numbers of the system."""
-    from fe_models.foundation.paths import replace_files
     from floatframe.design.generation.generate import generate
     from floatframe.errors import ModelError
     from floatframe.files.system_file.read_system import read_system
@@ -350,13 +343,7 @@ def write_code(
         generate(described, what=each, language=language, parameters=parameters, name=names[each]) for each in names
     ]
     files = {folder / path: text.encode() for code in codes for path, text in code.files.items()}
-    if any(path.resolve() == file.resolve() for path in files):
-        raise ModelError(f"--output {folder}: would overwrite {file}")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        replace_files(files)
-    except OSError as error:
-        raise ModelError(f"--output {folder}: cannot be written: {error.strerror}") from error
+    write_files(files, folder, ModelError, inputs=(file, *described.files))
     if json:
         record = {
             "files": [str(path) for path in files],
@@ -383,6 +370,29 @@ def write_code(
     )  # fmt: skip
     for path in files:
         say(f"wrote {path}")
+
+
+def write_files(
+    files: Mapping[Path, bytes], output: Path, error: type[Exception], *, inputs: Iterable[str | Path]
+) -> None:
+    """Write files and their folders; all files are complete, or none is written.
+
+    Raises
+    ------
+    error
+        If a file is one of the inputs, or cannot be written.
+    """
+    from fe_models.foundation.paths import replace_files, same_file
+
+    for source in map(Path, inputs):
+        if any(same_file(path, source) for path in files):
+            raise error(f"--output {output}: would overwrite {source}, which is an input; choose another name")
+    try:
+        for path in files:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        replace_files(files)
+    except OSError as reason:
+        raise error(f"--output {output}: cannot be written: {reason.strerror}") from reason
 
 
 RESULTS, SYSTEM = "a results file (.h5)", "a system file (.toml)"

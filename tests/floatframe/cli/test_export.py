@@ -85,6 +85,9 @@ def test_a_target_is_chosen_by_name_by_the_ending_or_by_default(folder, monkeypa
         ("swing.h5 --to vtk --every 5", "export: no body with a surface"),
         ("swing.h5 --every 2", "--every: belongs to --to vtk; --to csv has --sensor"),
         ("swing.toml --to fmu --parameter m", "--parameter m: expected NAME=KEY.PATH"),
+        ("swing.toml --to fmu --fmi 0", "fmi: expected one of 2, 3, got 0"),
+        ("swing.toml --to fmu-c --step 0", "step: expected a time above 0, got 0.0"),
+        ("swing.toml --to urdf -o swing.toml", "--output swing.toml: would overwrite swing.toml, which is an input"),
     ],
 )
 def test_a_target_that_does_not_fit_is_refused_and_nothing_is_written(folder, monkeypatch, words, message):
