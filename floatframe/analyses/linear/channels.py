@@ -15,7 +15,7 @@ from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.forces import driven_forces
 from floatframe.model.system import Named, System
-from floatframe.results.sensors import coordinate_sensors, sensor_and_column
+from floatframe.results.sensors import coordinate_sensors, named_coordinates, sensor_and_column
 from floatframe.results.sensors.channels import VALUE, Channel, CoordinateChannel, StressChannel
 from floatframe.results.sensors.loads import CoordinateSensor
 from floatframe.results.sensors.measurement import Measurement
@@ -165,7 +165,7 @@ def named_output(system: System, output: AnyOutput | str) -> AnyOutput:
     own = {each.name: each for each in (*outputs_of(system.outputs), *outputs_of(system.inputs))}
     if output in own:
         return own[output]
-    if (place := named_place(output)) is not None:
+    if (place := named_place(system, output)) is not None:
         return place
     sensor, column = sensor_and_column(system, output)
     if isinstance(sensor, CoordinateSensor) and column in ("", VALUE):
@@ -193,27 +193,27 @@ def named_input(system: System, channel: AnyInput | str) -> AnyInput:
         for joint in system.joints
         for coordinate in getattr(joint, "motions", {})
     }
-    coordinates = {each.name: each for each in coordinate_sensors(system)}
+    coordinates = named_coordinates(system)
     if channel in own:
         return own[channel]
     if channel in forces:
         return ForceInput(channel, forces[channel].name)
     if channel in drives:
         return drives[channel]
-    if (text := channel.replace(" ", ".")) in coordinates or (text := channel) in coordinates:
-        sensor = cast(CoordinateSensor, coordinates[text])
+    if channel in coordinates:
+        sensor = coordinates[channel]
         return CoordinateChannel(channel, sensor.joint, sensor.coordinate)
-    if (place := named_place(channel)) is not None:
+    if (place := named_place(system, channel)) is not None:
         return place
-    hint = nearest(channel, [*own, *forces, *drives, *coordinates])
+    hint = nearest(channel, [*own, *forces, *drives, *(each.name for each in coordinate_sensors(system))])
     raise ModelError(
         f"system {system.name!r}: no input {quoted(channel)}: expected an input of the system, a force such as "
         f"'motor.torque', a drive such as 'joints.hub.angle', a coordinate, or body/interface:component{hint}"
     )
 
 
-def named_place(name: str) -> Channel | None:
-    """Return the channel "body/interface:component" or "body:component"; None if the text has another form.
+def named_place(system: System, name: str) -> Channel | None:
+    """Return the channel "body/interface:component" or "body:component"; None if it begins with no body and a colon.
 
     Raises
     ------
@@ -221,11 +221,11 @@ def named_place(name: str) -> Channel | None:
         If there is no such component.
     """
     place, colon, component = name.rpartition(":")
-    if not colon:
+    body, _, interface = place.partition("/")
+    if not colon or body not in [each.name for each in system.bodies]:
         return None
     if component not in DIRECTIONS:
         raise ModelError(f"channel {name!r}: expected body/interface:component{nearest(component, DIRECTIONS)}")
-    body, _, interface = place.partition("/")
     k = DIRECTIONS.index(component)
     return Channel(name, Marker(body, interface or None), np.eye(3)[k % 3], "translation" if k < 3 else "rotation")
 

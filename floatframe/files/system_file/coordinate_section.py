@@ -7,6 +7,7 @@ from pydantic import BeforeValidator, Field, StringConstraints, model_validator
 
 from cms.body.address import Address
 from fe_models.foundation.toml_file import Matrix3, Table, Vector3, choice
+from floatframe.errors import ModelError
 from floatframe.files.system_file.place_key import PlaceOnBody
 from floatframe.model.bodies.coordinates import AxialAngle, AxialDistance, Coordinate, JointCoordinate, PointDistance
 from floatframe.model.bodies.markers import Marker
@@ -32,12 +33,13 @@ def of_joint(value: Any) -> Any:
     table = {"coordinate": value} if isinstance(value, str) else value
     if not isinstance(table, dict) or table.keys() & {"joint", "type", "body"}:
         return table
-    joint, dot, coordinate = str(table.get("coordinate", "")).rpartition(".")
-    if joint and dot and coordinate:
-        return table | {"joint": joint, "coordinate": coordinate}
-    if isinstance(value, str):
-        raise ValueError("expected a coordinate of a joint, such as 'hub.angle', or a table")
-    return table
+    try:
+        found = JointCoordinate.of_name(str(table.get("coordinate", "")))
+    except ModelError:
+        if isinstance(value, str):
+            raise ValueError("expected a coordinate of a joint, such as 'hub.angle', or a table") from None
+        return table
+    return table | {"joint": found.joint, "coordinate": found.coordinate}
 
 
 class CoordinateSection(Table):

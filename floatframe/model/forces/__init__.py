@@ -44,11 +44,13 @@ def driven_forces(forces: Iterable[Any]) -> dict[str, PointForce | BodyLoad | Jo
     """Return the forces whose amplitude or motor can be an input, by all their names.
 
     These are "push", "push.amplitude" and "forces.push.amplitude" for a force or load with an amplitude, and "motor",
-    "motor.torque" ("motor.force" along a distance) and "forces.motor.motor" for a joint force.
+    "motor.torque" ("motor.force" along a distance) and "forces.motor.motor" for a joint force. A force that itself is
+    called "motor.torque" keeps this name.
     """
     found: dict[str, PointForce | BodyLoad | JointForce] = {}
-    for force in forces:
-        if (key := WITH_AMPLITUDE.get(type(force))) is not None:
-            short = key if key == "amplitude" else "torque" if force.is_angular else "force"
-            found |= dict.fromkeys((force.name, f"{force.name}.{short}", f"forces.{force.name}.{key}"), force)
-    return found
+    driven = [force for force in forces if type(force) in WITH_AMPLITUDE]
+    for force in driven:
+        key = WITH_AMPLITUDE[type(force)]
+        short = key if key == "amplitude" else "torque" if force.is_angular else "force"
+        found |= dict.fromkeys((force.name, f"{force.name}.{short}", f"forces.{force.name}.{key}"), force)
+    return found | {force.name: force for force in driven}

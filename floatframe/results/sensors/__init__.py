@@ -64,6 +64,7 @@ __all__ = [
     "coordinate_sensors",
     "measured",
     "measurement_of",
+    "named_coordinates",
     "sensor_and_column",
     "sensor_of",
     "sensor_points",
@@ -130,18 +131,24 @@ def sensors_of(system: System) -> tuple[Sensor, ...]:
     return cast(tuple[Sensor, ...], system.sensors)
 
 
-def coordinate_sensors(system: System) -> tuple[Sensor, ...]:
+def coordinate_sensors(system: System) -> tuple[CoordinateSensor, ...]:
     """Return a sensor "joint.coordinate" for every coordinate of every joint; made once for a system."""
     return system.derived(make_coordinate_sensors)
 
 
-def make_coordinate_sensors(system: System) -> tuple[Sensor, ...]:
+def make_coordinate_sensors(system: System) -> tuple[CoordinateSensor, ...]:
     """Return a new sensor for every coordinate of every joint."""
     return tuple(
         CoordinateSensor(f"{joint.name}.{coordinate}", joint.name, coordinate)
         for joint in system.joints
         for coordinate in joint.coordinates
     )
+
+
+def named_coordinates(system: System) -> dict[str, CoordinateSensor]:
+    """Return the sensors of all joint coordinates by their names "pin.angle" and "pin angle"."""
+    sensors = coordinate_sensors(system)
+    return {f"{each.joint}{sign}{each.coordinate}": each for sign in " ." for each in sensors}
 
 
 def sensor_of(system: System, name: str) -> Sensor:
@@ -161,22 +168,23 @@ def sensor_of(system: System, name: str) -> Sensor:
 def sensor_and_column(system: System, name: str) -> tuple[Sensor, str]:
     """Return the sensor that a name means, and the name of one of its columns, "" for all.
 
-    A name is that of a sensor, of an output of the system, or of a coordinate, "pin.angle"; of a column of one of
-    these, "tip.x" or "tip x"; or of an output of an element, "damper.force" or "damper force".
+    A name is that of a sensor, of an output of the system, or of a coordinate, "pin.angle" or "pin angle"; of a column
+    of one of these, "tip.x" or "tip x"; or of an output of an element, "damper.force" or "damper force".
 
     Raises
     ------
     ModelError
         If there is none; the message has the nearest name.
     """
-    known: dict[str, Sensor] = {each.name: each for each in (*system.outputs, *system.sensors)}  # type: ignore[misc]
-    known |= {each.name: each for each in coordinate_sensors(system)}
+    own: dict[str, Sensor] = {each.name: each for each in (*system.outputs, *system.sensors)}  # type: ignore[misc]
+    coordinates = {each.name: each for each in coordinate_sensors(system)}
+    known = {**named_coordinates(system), **own, **coordinates}
     elements = [element.name for element in system.elements]
     owner, column = owner_and_column(name, [*known, *elements])
     if owner in known and (owner not in elements or not column):
         return known[owner], column
     if not column:
-        hint = nearest(name, [*known, *elements])
+        hint = nearest(name, [*own, *coordinates, *elements])
         raise ModelError(f"system {system.name!r}: no sensor or joint coordinate {quoted(name)}{hint}")
     return ElementSensor(name, owner, column), ""
 

@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import floatframe as ff
 from floatframe.analyses.snapshot import snapshot
 from floatframe.files.system_file.read_system import read_system
+from floatframe.model.forces import driven_forces
 from floatframe.results.sensors import sensor_and_column
 
 ARM = """
@@ -67,6 +68,7 @@ def system(tmp_path_factory):
         ("tip", "tip", ""), ("tip.x", "tip", "x"), ("tip x", "tip", "x"),
         ("pin.angle", "pin.angle", ""), ("pin.angle.rate", "pin.angle", "rate"),
         ("pin.angle rate", "pin.angle", "rate"),
+        ("pin angle", "pin.angle", ""), ("pin angle rate", "pin.angle", "rate"),
         ("left wheel", "left wheel", ""), ("left wheel x", "left wheel", "x"), ("left wheel.x", "left wheel", "x"),
         ("height", "height", ""),
     ],
@@ -103,6 +105,20 @@ def test_a_force_has_the_same_names_as_input_and_as_output_of_a_controller(syste
     ]  # fmt: skip
     assert_array_equal(motions[0].body("arm").r, motions[1].body("arm").r)
     assert motions[0].controller("hold").units[name] == "N m"
+
+
+def test_a_force_keeps_its_name_beside_a_longer_name_of_another(system):
+    driven = driven_forces(system.forces)
+    motor, named = driven["motor"], replace(driven["push"], name="motor.torque")
+    for forces in ([motor, named], [named, motor]):
+        found = driven_forces(forces)
+        assert (found["motor.torque"], found["forces.motor.motor"]) == (named, motor)
+
+
+def test_a_colon_in_the_name_of_a_sensor_is_no_place(system):
+    tip = replace(next(sensor for sensor in system.sensors if sensor.name == "tip"), name="tip:1")
+    linear = ff.linearize(replace(system, sensors=[tip], outputs=[]), inputs=["arm:z"], outputs=["tip:1 x", "arm:z"])
+    assert linear.outputs == ("tip:1 x", "arm:z")
 
 
 def test_a_user_force_and_a_coupler_take_the_name_of_a_coordinate(system):
@@ -151,6 +167,7 @@ def test_an_unknown_name_is_told_with_the_nearest(system, what):
         ('coordinates = {phi = "pin.angle"}', 'coordinates = {phi = "pin"}', "such as 'hub.angle', or a table"),
         ('sensor = "tip.z"', 'sensor = "top.z"', "no sensor 'top.z'; choices: left wheel, tip"),
         ('sensor = "tip.z"', 'coordinate = "pin.angle"', None),
+        ('sensor = "tip.z"', 'coordinate = "pin angle"', None),
     ],
 )
 def test_names_in_files(tmp_path, old, new, words):
