@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from fe_models.assembly.constraints import Constraint, MeanMotion, NodeEquation, RigidNodes
 from fe_models.assembly.join import Joined, Part, join
 from fe_models.assembly.lumped import lumped_beams, lumped_shells
-from fe_models.assembly.model import FEModel, ModelTables
+from fe_models.assembly.model import LUMPED, FEModel, ModelTables
 from fe_models.assembly.rods import rod_body
 from fe_models.assembly.tables.attachments import (
     followers_of,
@@ -270,7 +270,7 @@ def _parts(model: FEModel, stages: Stages, on_report: OnReport) -> tuple[list[Pa
     """Return bodies of solids, shells, lines, rods and attachments, and the meshes of the solids."""
     tables, lumped = model.tables, model.lumped
     if model.mass != "as the deck":
-        lumped = frozenset(("lines", "shells", "rods") if model.mass == "lumped" else ())
+        lumped = frozenset(LUMPED if model.mass == "lumped" else ())
     # row indices of the mesh serve as node numbers of the parts
     raw = replace(model.mesh, node_numbers=np.arange(len(model.mesh.nodes)))
     path = model.source or Path(model.name)

@@ -31,6 +31,7 @@ from fe_models.foundation.words import nearest, quoted
 __all__ = ["MASSES_OF_ALL", "FEModel", "ModelTables", "check_properties"]
 
 MASSES_OF_ALL = ("consistent", "lumped", "as the deck")  #: kinds of mass that a model may ask of all its elements
+LUMPED = ("lines", "shells", "rods")  #: kinds of elements whose mass may be lumped alone
 
 
 class ModelTables(Table):
@@ -133,6 +134,11 @@ class FEModel:
         for key, choices in (("mass", MASSES_OF_ALL), ("plane", tuple(PLANES))):
             if fields.get(key) is not None and fields[key] not in choices:
                 raise BodyError(f"{where}: {key}: unknown {quoted(fields[key])}{nearest(fields[key], choices)}")
+        if "lumped" in fields:
+            lumped = fields["lumped"]
+            fields["lumped"] = frozenset((lumped,) if isinstance(lumped, str) else lumped)
+            for kind in sorted(fields["lumped"].difference(LUMPED)):
+                raise BodyError(f"{where}: lumped: unknown {quoted(kind)}{nearest(kind, LUMPED)}")
         made = validated(ModelTables, tables, where, BodyError)
         try:
             check_properties(made)

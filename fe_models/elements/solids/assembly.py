@@ -211,7 +211,8 @@ def assembled_data(
             first_place += batch.size
             if progress is not None:
                 progress(first_place / len(graph.places))
-        require_upright(kind, is_inverted)
+        if is_inverted.any():
+            raise inversion_error(kind, is_inverted)
     return K_data, M_data
 
 
@@ -275,13 +276,12 @@ def require_assemblable(mesh: Mesh) -> list[str]:
     return kinds
 
 
-def require_upright(kind: str, is_inverted: np.ndarray) -> None:
-    """Raise `MeshError` that names the inverted elements of a type, if there are any."""
+def inversion_error(kind: str, is_inverted: np.ndarray) -> MeshError:
+    """Return the error that names the inverted elements of a type."""
     rows = np.flatnonzero(is_inverted)
-    if rows.size:
-        some = ", ".join(str(row) for row in rows[:5]) + (", ..." if rows.size > 5 else "")
-        raise MeshError(
-            f"assembly: {rows.size} of {len(is_inverted)} {kind} cells are inverted or collapsed (Jacobian "
-            f"not positive): cells {some}; expected the node order of VTK; repair the mesh, or straighten "
-            f"curved elements there"
-        )
+    some = ", ".join(str(row) for row in rows[:5]) + (", ..." if rows.size > 5 else "")
+    return MeshError(
+        f"assembly: {rows.size} of {len(is_inverted)} {kind} cells are inverted or collapsed (Jacobian "
+        f"not positive): cells {some}; expected the node order of VTK; repair the mesh, or straighten "
+        f"curved elements there"
+    )

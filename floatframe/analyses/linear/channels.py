@@ -205,7 +205,12 @@ def named_input(system: System, channel: AnyInput | str) -> AnyInput:
         return CoordinateChannel(channel, sensor.joint, sensor.coordinate)
     if (place := named_place(system, channel)) is not None:
         return place
-    hint = nearest(channel, [*own, *forces, *drives, *(each.name for each in coordinate_sensors(system))])
+    place, colon, _ = channel.rpartition(":")
+    if colon:
+        body = place.partition("/")[0]
+        hint = f"; no body {quoted(body)}{nearest(body, [each.name for each in system.bodies])}"
+    else:
+        hint = nearest(channel, [*own, *forces, *drives, *(each.name for each in coordinate_sensors(system))])
     raise ModelError(
         f"system {system.name!r}: no input {quoted(channel)}: expected an input of the system, a force such as "
         f"'motor.torque', a drive such as 'joints.hub.angle', a coordinate, or body/interface:component{hint}"

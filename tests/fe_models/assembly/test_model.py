@@ -63,6 +63,7 @@ RULES = {"left": "full", "right": "incompatible"}
             r"links\.l\.components: belong to a whole deck",
         ),
         ({"sections": {"s": ROUND, "t": ROUND}}, r'sections\.s: lines = "all", but there are 2 tables'),
+        ({"mass": "as the deck", "lumped": {"lines", "shell"}}, "lumped: unknown 'shell'; did you mean 'shells'"),
         ({"mesh": None}, r"mesh: expected one of RawMesh, Mesh, ShellMesh, LineMesh, got NoneType"),
     ],
 )
