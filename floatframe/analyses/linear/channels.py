@@ -205,9 +205,8 @@ def named_input(system: System, channel: AnyInput | str) -> AnyInput:
         return CoordinateChannel(channel, sensor.joint, sensor.coordinate)
     if (place := named_place(system, channel)) is not None:
         return place
-    place, colon, _ = channel.rpartition(":")
-    if colon:
-        body = place.partition("/")[0]
+    if ":" in channel:
+        body = channel.rpartition(":")[0].partition("/")[0]
         hint = f"; no body {quoted(body)}{nearest(body, [each.name for each in system.bodies])}"
     else:
         hint = nearest(channel, [*own, *forces, *drives, *(each.name for each in coordinate_sensors(system))])
