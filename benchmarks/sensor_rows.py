@@ -29,7 +29,7 @@ def system() -> ff.System:
         *(ff.sensors.PlaceSensor(quantity, tip, quantity) for quantity in quantities),
         ff.sensors.PlaceSensor("acceleration seen from the tip", wheel, "acceleration", relative_to=tip),
         ff.sensors.AngleSensor("angle", tip, wheel),
-        ff.sensors.CoordinateSensor("coordinate", "axle", "angle"),
+        ff.joints.JointCoordinate("axle", "angle", "coordinate"),
         ff.sensors.ReactionSensor("reaction", "axle"),
         ff.sensors.ReactionSensor("reaction in the axes of the tip", "axle", axes="marker"),
         ff.sensors.DisplacementSensor("displacement", tip),

@@ -1,6 +1,5 @@
 from .model.bodies.coordinates import AxialAngle as AxialAngle
 from .model.bodies.coordinates import AxialDistance as AxialDistance
-from .model.bodies.coordinates import JointCoordinate as JointCoordinate
 from .model.bodies.coordinates import PointDistance as PointDistance
 from .model.joints.coordinate_coupler import CoordinateCoupler as CoordinateCoupler
 from .model.joints.coordinate_coupler import Limits as Limits
@@ -15,3 +14,4 @@ from .model.joints.point_joints import PointOnLine as PointOnLine
 from .model.joints.point_joints import PointOnPlane as PointOnPlane
 from .model.joints.rolling_disc import RollingDisc as RollingDisc
 from .model.joints.sliding import SlidingJoint as SlidingJoint
+from .results.sensors.joint_coordinate import JointCoordinate as JointCoordinate

@@ -3,13 +3,11 @@ from .results.sensors.body_loads import InterfaceForceSensor as InterfaceForceSe
 from .results.sensors.body_loads import RecoverySensor as RecoverySensor
 from .results.sensors.body_loads import SpringSensor as SpringSensor
 from .results.sensors.channels import Channel as Channel
-from .results.sensors.channels import CoordinateChannel as CoordinateChannel
 from .results.sensors.channels import StressChannel as StressChannel
 from .results.sensors.elements import BushingSensor as BushingSensor
 from .results.sensors.elements import ControlSensor as ControlSensor
 from .results.sensors.elements import CouplerSensor as CouplerSensor
 from .results.sensors.elements import ElementSensor as ElementSensor
-from .results.sensors.loads import CoordinateSensor as CoordinateSensor
 from .results.sensors.loads import EnergySensor as EnergySensor
 from .results.sensors.loads import ModeSensor as ModeSensor
 from .results.sensors.loads import MomentumSensor as MomentumSensor

@@ -31,7 +31,7 @@ from floatframe.engine.initial_conditions.initial import assembled
 from floatframe.engine.initial_conditions.newton_equations import displaced, in_ground_axes, linearized, set_iterate
 from floatframe.engine.kernels.work import Work, new_work
 from floatframe.errors import ModelError
-from floatframe.model.bodies.coordinates import JointCoordinate
+from floatframe.model.bodies.coordinates import JointCoordinateName
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.checked_values import array_of_shape, number, rotation_of
 from floatframe.model.joints import SlidingJoint
@@ -179,7 +179,7 @@ class Search:
         for coupler in system.couplers:
             if coupler.limits is not None and len(coupler.terms) == 1:
                 coordinate, factor = coupler.terms[0]
-                if isinstance(coordinate, JointCoordinate):
+                if isinstance(coordinate, JointCoordinateName):
                     name = f"{coordinate.joint}.{coordinate.coordinate}"
                     ends = [
                         None if end is None else end / factor for end in (coupler.limits.lower, coupler.limits.upper)

@@ -11,9 +11,8 @@ from cms.cli.arguments import SetValues, changes_of
 from cms.cli.console import guarded, output_path, print_table, say, stages
 
 if TYPE_CHECKING:
-    from fe_models.foundation.units import Units
     from floatframe.model.system import System
-    from floatframe.results.joint_coordinates import CoordinateMotion
+    from floatframe.results.sensors.measurement import Measurement
     from floatframe.results.trajectory import Trajectory
 
 __all__ = ["inverse_command", "kinematics_command"]
@@ -138,7 +137,7 @@ def driven_motion(
 
 def coordinates_record(system: "System", motion: "Trajectory") -> dict[str, Any]:
     """Return ranges of all joint coordinates, and forces of the driven ones, in plain types."""
-    from floatframe.results.joint_coordinates import joint_coordinates
+    from floatframe.results.sensors import coordinate_sensors, measured
     from floatframe.results.small_motions.joint_rates import driven_coordinates
 
     driven = driven_coordinates(system)
@@ -149,20 +148,20 @@ def coordinates_record(system: "System", motion: "Trajectory") -> dict[str, Any]
         "t_first": float(motion.t[0]),
         "t_last": float(motion.t[-1]),
         "coordinates": {
-            name: coordinate_record(coordinate, name in driven, system.units)
-            for name, coordinate in joint_coordinates(system, motion).items()
+            name: coordinate_record(coordinate, name in driven)
+            for name, coordinate in measured(system, motion, coordinate_sensors(system)).items()
         },
     }
 
 
-def coordinate_record(coordinate: "CoordinateMotion", is_driven: bool, units: "Units") -> dict[str, Any]:
+def coordinate_record(coordinate: "Measurement", is_driven: bool) -> dict[str, Any]:
     """Return the ranges of a coordinate, of its rate and, if it is driven, of its force."""
     import numpy as np
 
     value, rate, force = coordinate.value, coordinate.rate, coordinate.force
     record: dict[str, Any] = {
         "is_driven": is_driven,
-        "unit": "rad" if coordinate.is_angle else units.length_symbol,
+        "unit": coordinate.units["value"],
         "least": float(value.min()),
         "greatest": float(value.max()),
         "rate_least": float(rate.min()),
@@ -170,7 +169,7 @@ def coordinate_record(coordinate: "CoordinateMotion", is_driven: bool, units: "U
     }
     if is_driven:
         record |= {
-            "force_unit": f"{units.force_symbol} {units.length_symbol}" if coordinate.is_angle else units.force_symbol,
+            "force_unit": coordinate.units["force"],
             "force_least": float(force.min()),
             "force_greatest": float(force.max()),
             "force_rms": float(np.sqrt((force**2).mean())),

@@ -4,8 +4,6 @@ from .element_motion import ElementMotion as ElementMotion
 from .element_motion import element_motion as element_motion
 from .export import export_vtk as export_vtk
 from .export import motion_table as motion_table
-from .joint_coordinates import joint_coordinate as joint_coordinate
-from .joint_coordinates import joint_coordinates as joint_coordinates
 from .motion import Motion as Motion
 from .place_motion import interface_motion as interface_motion
 from .place_motion import largest_von_mises as largest_von_mises

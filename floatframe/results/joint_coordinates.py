@@ -1,4 +1,4 @@
-"""Joint coordinates during a motion: value, rate, and the force along them."""
+"""Markers of joints during a motion, and the directions of joint coordinates as placed."""
 
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
@@ -6,26 +6,22 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.words import nearest, quoted
-from floatframe.engine.compiling.counted_angles import angle_of
 from floatframe.engine.compiling.markers import MarkerData, joint_markers, marker_pose, n_q_of
 from floatframe.engine.compiling.system import compiled_system
-from floatframe.errors import ResultsError
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.bodies.marker_shape import interface_shape
 from floatframe.model.bodies.markers import body_name
 from floatframe.model.joints import Joint
-from floatframe.model.joints.rows import MOMENT, SPAN, TWIST_B, RelativePlace, RowCoordinate
+from floatframe.model.joints.rows import SPAN, TWIST_B, RelativePlace, RowCoordinate
 from floatframe.model.joints.sliding import SlidingJoint, line_triad
 from floatframe.model.rotations import cross, dot, left_jacobian, rotated, rotation_matrix
 from floatframe.model.system import System
-from floatframe.results.full_turns import through_turns
 from floatframe.results.place_motion import PlaceMotion, as_moved, shape_motion, still_place
 from floatframe.results.small_motions.rows import Rows
 from floatframe.results.small_motions.small_motions import SmallMotions
 from floatframe.results.trajectory import Trajectory
 
-__all__ = ["CoordinateMotion", "SlidingPlace", "force_rows", "joint_coordinate", "joint_coordinates", "sliding_place"]
+__all__ = ["SlidingPlace", "as_placed", "end_motion", "force_rows", "sliding_place"]
 
 
 # the coordinate of a sliding joint during a motion: the position of B along the deformed line -------------------------
@@ -127,78 +123,6 @@ class Line:
 # joint coordinates ----------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False)
-class CoordinateMotion:
-    """A coordinate of a joint over time."""
-
-    t: Array  #: output times, (n_t,) [s]
-    value: Array  #: distance, or angle counted through full turns, (n_t,) [m, rad]
-    rate: Array  #: rate of the coordinate, (n_t,) [m/s, rad/s]
-    #: force or torque of the drive or of joint forces, positive if it tends to increase the coordinate, (n_t,) [N, N m]
-    force: Array
-    is_angle: bool = False  #: whether the coordinate is an angle [rad] or a distance [m]
-
-
-def joint_coordinates(system: System, trajectory: Trajectory) -> dict[str, CoordinateMotion]:
-    """Return all coordinates of all joints, by name "joint.coordinate".
-
-    Parameters
-    ----------
-    system
-        The system that moved.
-    trajectory
-        Its motion.
-    """
-    return {
-        f"{joint.name}.{name}": joint_coordinate(system, trajectory, joint.name, name)
-        for joint in system.joints
-        for name in joint.coordinates
-    }
-
-
-def joint_coordinate(system: System, trajectory: Trajectory, joint: str, coordinate: str) -> CoordinateMotion:
-    """Return a joint coordinate during a motion of the system.
-
-    Parameters
-    ----------
-    system
-        The system that moved.
-    trajectory
-        Its motion.
-    joint
-        Name of the joint.
-    coordinate
-        Name of one of its coordinates, such as "angle".
-
-    Raises
-    ------
-    ResultsError
-        If there is no such joint or coordinate, or the motion is of another system.
-    """
-    names = [each.name for each in system.joints]
-    if joint not in names or names != list(trajectory.head.joints):
-        raise ResultsError(f"joint_coordinate: no joint {quoted(joint)} in the motion{nearest(joint, names)}")
-    found: Joint = system.joints[names.index(joint)]
-    if coordinate not in found.coordinates:
-        raise ResultsError(
-            f"joint_coordinate: joint {joint!r} has no coordinate {coordinate!r}"
-            f"{nearest(coordinate, list(found.coordinates))}"
-        )
-    ends, own = as_placed(system, found, coordinate)
-    if isinstance(found, SlidingJoint):
-        return sliding_motion(system, trajectory, found, ends[1])
-    assert own is not None
-    a, b = (end_motion(system, trajectory, end) for end in ends)
-    place = RelativePlace(a.axes, b.axes, b.position - a.position)
-    slip = b.velocity - a.velocity - cross(a.omega, place.d)
-    rate = dot(own.direction(place), own.moves(slip, b.omega - a.omega))
-    w = trajectory.source.read("w")[:, trajectory.head.w0[names.index(joint)] :]
-    value = own.value(place)
-    if own.is_angle:
-        value = through_turns(trajectory, f"coordinate {joint}.{coordinate}", angle_of(own, *ends), value, rate)
-    return CoordinateMotion(a.t, value, rate, own.force(place, w), own.is_angle)
-
-
 #: markers and coordinates by joint and name; cached because runs with events need them repeatedly
 PLACED: WeakKeyDictionary[System, dict[tuple[str, str], tuple]] = WeakKeyDictionary()
 
@@ -246,22 +170,6 @@ def force_rows(small: SmallMotions, joint: str, coordinate: str) -> Rows | None:
         return rows - (b.moved - a.moved).mapped((w - (w @ E) * E) / np.linalg.norm(d))
     holder = b if own.kind == TWIST_B else a
     return rows - holder.rotation.mapped(np.cross(E, w))
-
-
-def sliding_motion(
-    system: System, trajectory: Trajectory, joint: SlidingJoint, marker_b: MarkerData
-) -> CoordinateMotion:
-    """Return the position along a deformed line; the force is that of the drive, zero for free sliding."""
-    b = end_motion(system, trajectory, marker_b)
-    place = sliding_place(system, trajectory, joint, b)
-    first = trajectory.head.w0[[each.name for each in system.joints].index(joint.name)]
-    w = trajectory.source.read("w")[:, first : first + joint.size]
-    force = np.zeros(len(b.t))
-    if joint.motions:
-        force = -dot(w[:, :3], place.tangent)
-        if joint.is_aligned:
-            force = force - dot(w[:, MOMENT : MOMENT + 3], place.turning)
-    return CoordinateMotion(b.t, place.s, place.rate, force)
 
 
 def end_motion(system: System, trajectory: Trajectory, end: MarkerData) -> PlaceMotion:

@@ -22,12 +22,12 @@ from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError, ResultsError
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.system import System
-from floatframe.results.joint_coordinates import CoordinateMotion, joint_coordinate
 from floatframe.results.place_motion import PlaceMotion, interface_motion, nodal_stress
 from floatframe.results.recovery import nodal_displacements
 from floatframe.results.sensor_choice import chosen_measurements, controller_samples
 from floatframe.results.sensor_plots import figure_of, plot_columns, plot_sensors
 from floatframe.results.sensors import coordinate_sensors, measured, measurement_of, sensors_of
+from floatframe.results.sensors.joint_coordinate import JointCoordinate
 from floatframe.results.sensors.measurement import Measurement
 from floatframe.results.trajectory import BodyMotion, Drift, Reaction, Trajectory
 
@@ -222,15 +222,15 @@ class JointMotion:
         """Constraint error of the joint."""
         return self.motion.drift(self.name)
 
-    def coordinate(self, name: str) -> CoordinateMotion:
-        """Return a coordinate with its rate and force; `ResultsError` if it does not exist."""
+    def coordinate(self, name: str) -> Measurement:
+        """Return the columns value, rate and force of a coordinate; `ResultsError` if it does not exist."""
         if name not in self.coordinates:
             choices = self.coordinates
             raise ResultsError(
                 f"joint {self.name!r}: no coordinate {quoted(name)}{nearest(name, choices)}; it has "
                 f"{', '.join(choices) or 'none'}"
             )
-        return joint_coordinate(self.motion.system, self.motion, self.name, name)
+        return JointCoordinate(self.name, name).measure(self.motion.system, self.motion)
 
     def __getattr__(self, name: str) -> Array:
         if name.startswith("__"):
@@ -243,8 +243,7 @@ class JointMotion:
             raise AttributeError(
                 f"joint {self.name!r} has no {name!r}; its coordinates are {', '.join(self.coordinates) or 'none'}"
             )
-        values: Array = getattr(self.coordinate(coordinate), part)
-        return values
+        return self.coordinate(coordinate)[part]
 
     def __dir__(self) -> list[str]:
         ends = ("", "_rate", "_force")

@@ -11,7 +11,8 @@ from floatframe.errors import ModelError, ResultsError
 from floatframe.model.forces import driven_forces
 from floatframe.model.system import System
 from floatframe.results.sensors import coordinate_sensors, measured, measurement_of, sensor_of, sensors_of
-from floatframe.results.sensors.loads import CoordinateSensor, ReactionSensor
+from floatframe.results.sensors.joint_coordinate import JointCoordinate
+from floatframe.results.sensors.loads import ReactionSensor
 from floatframe.results.sensors.measurement import Measurement, Sensor, amplitude_unit, unit_words, vector_columns
 from floatframe.results.trajectory import Trajectory
 
@@ -113,7 +114,7 @@ def measurements_of_part(system: System, trajectory: Trajectory, name: str) -> d
     """Return the measurements of the joint, body or controller with this name; none if it does not exist."""
     for joint in system.joints:
         if joint.name == name:
-            own: list[Sensor] = [CoordinateSensor(f"{name}.{each}", name, each) for each in joint.coordinates]
+            own: list[Sensor] = [JointCoordinate(name, each) for each in joint.coordinates]
             return measured(system, trajectory, [*own, ReactionSensor(f"{name} reaction", name)])
     if name in trajectory.body_names:
         columns, units = vector_columns(trajectory.body(name).r, unit_words(system.units, "length"))

@@ -16,7 +16,7 @@ from floatframe.model.joints.sliding import SlidingJoint
 from floatframe.model.system import System
 from floatframe.results.joint_coordinates import as_placed
 from floatframe.results.sensors import sensor_and_column
-from floatframe.results.sensors.loads import CoordinateSensor
+from floatframe.results.sensors.joint_coordinate import JointCoordinate
 from floatframe.simulation.events import Event
 
 __all__ = ["MOST_NEIGHBOURS", "direct_values", "expected_passage", "passage"]
@@ -41,12 +41,12 @@ def direct_values(system: System, event: Event) -> Values | None:
     if event.at is not None:
         return lambda rows: rows.t
     sensor, column = sensor_and_column(system, event.watch)
-    if type(sensor) is CoordinateSensor and (column or event.column) in ("", "value"):
+    if isinstance(sensor, JointCoordinate) and sensor.rate is None and (column or event.column) in ("", "value"):
         return counted_angle_of(system, sensor)
     return None
 
 
-def counted_angle_of(system: System, sensor: CoordinateSensor) -> Values | None:
+def counted_angle_of(system: System, sensor: JointCoordinate) -> Values | None:
     """Return the angle of a joint as the run counts it; None if it is not counted."""
     joint = next(each for each in system.joints if each.name == sensor.joint)
     if isinstance(joint, SlidingJoint):

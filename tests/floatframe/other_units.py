@@ -39,7 +39,7 @@ from floatframe.components.wheels.roads.road import Grip
 from floatframe.components.wheels.tyre_file import TyreProperties
 from floatframe.engine.compiling.placing import placed_bodies
 from floatframe.forces import BodyLoad, Bushing, SphereContact
-from floatframe.joints import AxialDistance, CoordinateCoupler, PointDistance, RollingDisc, ScrewJoint
+from floatframe.joints import AxialDistance, CoordinateCoupler, JointCoordinate, PointDistance, RollingDisc, ScrewJoint
 from floatframe.model.bodies.ground import GROUND
 from floatframe.model.bodies.markers import body_name
 from floatframe.model.functions.time_functions import TimeFunction
@@ -47,7 +47,6 @@ from floatframe.model.rotations import euler_parameter_product, euler_parameters
 from floatframe.results.sensors import (
     AngleSensor,
     Channel,
-    CoordinateChannel,
     ElongationSensor,
     ModeSensor,
     StrainGauge,
@@ -213,7 +212,7 @@ FIELDS = {
     # sensors
     AngleSensor: {"axis": "1"},
     Channel: {"direction": "1", "rate": "1"},
-    CoordinateChannel: {"rate": "1"},
+    JointCoordinate: {"rate": "1"},
     ElongationSensor: {"position_a": "m", "position_b": "m", "tolerance": "1"},
     ModeSensor: {"mode": "1"},
     StrainGauge: {"direction": "1", "young": PRESSURE, "poisson": "1", "position": "m", "tolerance": "1"},

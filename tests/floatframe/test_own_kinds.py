@@ -91,7 +91,7 @@ def machine(*, is_own, has_force=True, is_flexible=False, motions=None):
     spring = ff.SpringDamper("spring", ff.Marker(ff.GROUND), ends[0], stiffness=300.0, damping=2.0)
     both = cord(is_own=is_own) if has_force else {}
     forces = [GRAVITY, spring, *both.pop("forces", [])] if has_force else [GRAVITY]
-    sensors = [ff.sensors.CoordinateSensor("angle", "pin", "angle"), ff.sensors.PlaceSensor("tip", TIP)]
+    sensors = [ff.joints.JointCoordinate("pin", "angle", "angle"), ff.sensors.PlaceSensor("tip", TIP)]
     return ff.System([rod, arm], joints, forces, sensors=sensors, **both)
 
 
@@ -146,8 +146,8 @@ def run(system, formulation="absolute", **options):
 def small(system, formulation="absolute"):
     """Return the equilibrium, and the system linearised about it: a torque along the pin goes in, the tip comes out."""
     about = ff.static_equilibrium(system, formulation=formulation)
-    inputs = [ff.sensors.CoordinateChannel("torque", "pin", "angle")]
-    outputs = [ff.sensors.Channel("tip", TIP, (0, 1, 0)), ff.sensors.CoordinateChannel("rate", "pin", "angle", rate=1)]
+    inputs = [ff.joints.JointCoordinate("pin", "angle", "torque", rate=0)]
+    outputs = [ff.sensors.Channel("tip", TIP, (0, 1, 0)), ff.joints.JointCoordinate("pin", "angle", "rate", rate=1)]
     return about, ff.linearize(system, about, inputs=inputs, outputs=outputs, formulation=formulation)
 
 
@@ -198,8 +198,8 @@ def results(system, folder, formulation):
     path = folder / f"{formulation}.h5"
     motion = run(system, formulation, output=path)
     assert_allclose(ff.read_results(path).body("arm").r, motion.body("arm").r, rtol=0, atol=0)
-    angle = ff.results.joint_coordinate(system, motion, "pin", "angle")
-    assert_allclose(ff.results.joint_coordinates(system, motion)["pin.angle"].value, angle.value, rtol=0, atol=0)
+    angle = ff.joints.JointCoordinate("pin", "angle").measure(system, motion)
+    assert_allclose(motion.joint("pin").angle, angle.value, rtol=0, atol=0)
     assert_allclose(motion.sensor("angle")["value"], angle.value, rtol=0, atol=0)
     ff.results.motion_table(motion, system=system).write(folder / "motion.csv")
     tip = ff.sensors.measured(system, motion)["tip"]
@@ -264,7 +264,7 @@ BOTH = {
     "sensitivities": sensitivities,
     "mobility": lambda system, _: ff.analyses.mobility(system).n_freedoms,
     "consistent_state": lambda system, _: ff.analyses.consistent_state(system).state.u,
-    "integrate read_results joint_coordinate joint_coordinates": lambda *given: results(*given, "absolute"),
+    "integrate read_results JointCoordinate": lambda *given: results(*given, "absolute"),
     "integrate in joint coordinates": lambda *given: results(*given, "relative"),
     "resume": resumed,
     "computed_outputs": outputs,

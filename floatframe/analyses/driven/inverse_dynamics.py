@@ -23,7 +23,8 @@ from floatframe.model.forces import JointForce
 from floatframe.model.functions.time_functions import table
 from floatframe.model.state import State
 from floatframe.model.system import System
-from floatframe.results.joint_coordinates import CoordinateMotion, joint_coordinate
+from floatframe.results.sensors.joint_coordinate import JointCoordinate
+from floatframe.results.sensors.measurement import Measurement
 from floatframe.results.small_motions.joint_rates import driven_coordinates
 from floatframe.results.trajectory import Trajectory
 
@@ -45,7 +46,7 @@ class InverseDynamics:
     """
 
     motion: Trajectory
-    drives: Mapping[str, CoordinateMotion]
+    drives: Mapping[str, Measurement]
 
 
 def inverse_dynamics(
@@ -76,7 +77,7 @@ def inverse_dynamics(
     return InverseDynamics(motion, drive_forces(system, motion))
 
 
-def drive_forces(system: System, motion: Trajectory) -> dict[str, CoordinateMotion]:
+def drive_forces(system: System, motion: Trajectory) -> dict[str, Measurement]:
     """Return value, rate and force of all driven coordinates in any motion of the system, by "joint.coordinate".
 
     Parameters
@@ -89,11 +90,11 @@ def drive_forces(system: System, motion: Trajectory) -> dict[str, CoordinateMoti
     found = {}
     for name in driven_coordinates(system):
         joint, _, coordinate = name.rpartition(".")
-        found[name] = joint_coordinate(system, motion, joint, coordinate)
+        found[name] = JointCoordinate(joint, coordinate).measure(system, motion)
     return found
 
 
-def with_motors(system: System, drives: Mapping[str, CoordinateMotion]) -> System:
+def with_motors(system: System, drives: Mapping[str, Measurement]) -> System:
     """Return the system with motors in place of these drives; the motor forces are cubic splines over time.
 
     Parameters
@@ -122,7 +123,7 @@ def with_motors(system: System, drives: Mapping[str, CoordinateMotion]) -> Syste
     return replace(system, joints=joints, forces=[*system.forces, *motors])
 
 
-def released(joint: Any, drives: Mapping[str, CoordinateMotion]) -> Any:
+def released(joint: Any, drives: Mapping[str, Measurement]) -> Any:
     """Return a joint without its prescribed motions that are among the drives."""
     motions = getattr(joint, "motions", None)
     if not motions:

@@ -1,7 +1,7 @@
 """Inputs and outputs of a linearised system: loads and motions that act on it, and observed sensor columns."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, cast
 
 import numpy as np
@@ -16,8 +16,8 @@ from floatframe.model.bodies.markers import Marker
 from floatframe.model.forces import driven_forces
 from floatframe.model.system import Named, System
 from floatframe.results.sensors import coordinate_sensors, named_coordinates, sensor_and_column
-from floatframe.results.sensors.channels import VALUE, Channel, CoordinateChannel, StressChannel
-from floatframe.results.sensors.loads import CoordinateSensor
+from floatframe.results.sensors.channels import VALUE, Channel, StressChannel
+from floatframe.results.sensors.joint_coordinate import JointCoordinate
 from floatframe.results.sensors.measurement import Measurement
 from floatframe.results.small_motions.rows import LinearColumns, Rows, joined
 from floatframe.results.small_motions.small_motions import SmallMotions
@@ -55,7 +55,7 @@ class AnyOutput(Protocol):
         """Return the same columns as functions of small motions, if they are linear."""
 
 
-AnyInput = Channel | CoordinateChannel | DriveMotion | BaseMotion | ParameterInput | ForceInput
+AnyInput = Channel | JointCoordinate | DriveMotion | BaseMotion | ParameterInput | ForceInput
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,8 +168,8 @@ def named_output(system: System, output: AnyOutput | str) -> AnyOutput:
     if (place := named_place(system, output)) is not None:
         return place
     sensor, column = sensor_and_column(system, output)
-    if isinstance(sensor, CoordinateSensor) and column in ("", VALUE):
-        return CoordinateChannel(output, sensor.joint, sensor.coordinate)
+    if isinstance(sensor, JointCoordinate) and sensor.rate is None and column in ("", VALUE):
+        return replace(sensor, name=output, rate=0)
     return Column(sensor, column, output) if column else sensor
 
 
@@ -201,8 +201,7 @@ def named_input(system: System, channel: AnyInput | str) -> AnyInput:
     if channel in drives:
         return drives[channel]
     if channel in coordinates:
-        sensor = coordinates[channel]
-        return CoordinateChannel(channel, sensor.joint, sensor.coordinate)
+        return replace(coordinates[channel], name=channel)
     if (place := named_place(system, channel)) is not None:
         return place
     if ":" in channel:
@@ -241,7 +240,7 @@ def require_input(channel: Any) -> None:
     if not isinstance(channel, AnyInput):
         raise ModelError(
             f"linearize: {getattr(channel, 'name', channel)!r} is not an input: expected a Channel or a "
-            "CoordinateChannel (a force along it), ForceInput, DriveMotion, BaseMotion or ParameterInput"
+            "JointCoordinate (a force along it), ForceInput, DriveMotion, BaseMotion or ParameterInput"
         )
 
 

@@ -25,7 +25,7 @@ from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.newton_equations import linearized, set_iterate
 from floatframe.engine.kernels.work import new_work
 from floatframe.errors import ModelError
-from floatframe.model.bodies.coordinates import JointCoordinate
+from floatframe.model.bodies.coordinates import JointCoordinateName
 from floatframe.model.bodies.markers import body_name
 from floatframe.model.checked_values import array_of_shape, unit_vector
 from floatframe.model.forces import UserForce
@@ -33,7 +33,8 @@ from floatframe.model.functions.time_functions import TimeFunction, constant, po
 from floatframe.model.joints.rows import kind_of
 from floatframe.model.state import State
 from floatframe.model.system import System
-from floatframe.results.sensors.channels import QUANTITIES, RATES, Channel, CoordinateChannel, rate_unit
+from floatframe.results.sensors.channels import QUANTITIES, RATES, Channel, rate_unit
+from floatframe.results.sensors.joint_coordinate import JointCoordinate
 from floatframe.results.small_motions.small_motions import BaseColumn, InputForce, SmallMotions
 from floatframe.results.trajectory import Trajectory
 
@@ -229,14 +230,14 @@ def column_of(small: SmallMotions, k: int, channel: Any) -> tuple[Array, Array, 
         E = parameter_rows(small, channel)
     elif isinstance(channel, ForceInput):
         F, E = force_column(small, channel)
-    elif isinstance(channel, CoordinateChannel) and (row := free_row(small, channel)) is not None:
+    elif isinstance(channel, JointCoordinate) and (row := free_row(small, channel)) is not None:
         E[row] = 1.0
     else:
         F = replace(channel, rate=0).linear(small).columns["value"].x[0, : small.n_u]
     return F, E, E_rate
 
 
-def free_row(small: SmallMotions, channel: CoordinateChannel) -> int | None:
+def free_row(small: SmallMotions, channel: JointCoordinate) -> int | None:
     """Return the force row of a free coordinate, force + Q = 0; None if there is none, as in screws.
 
     A force in this row is an internal force of the joint, like that of a `JointForce`.
@@ -318,7 +319,7 @@ def moved_markers(small: SmallMotions, base: BaseColumn) -> list[int]:
     coordinates = [c for coupler in small.system.couplers for c, _ in coupler.terms]
     coordinates += [c for force in user_forces for c in force.coordinates.values()]
     for own, a, b in zip(coordinates, model.coordinates.a, model.coordinates.b, strict=True):
-        if isinstance(own, JointCoordinate):
+        if isinstance(own, JointCoordinateName):
             owners[a] = owners[b] = own.joint
     return [m for m, body in enumerate(model.markers.body) if body < 0 and owners[m] in base.moved]
 

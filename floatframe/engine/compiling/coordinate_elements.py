@@ -18,7 +18,13 @@ from floatframe.engine.kernels import model
 from floatframe.engine.kernels.model import COUPLER, USER_FORCE
 from floatframe.engine.kernels.records import filled, of_items
 from floatframe.errors import ModelError
-from floatframe.model.bodies.coordinates import AxialAngle, AxialDistance, Coordinate, JointCoordinate, coordinate_of
+from floatframe.model.bodies.coordinates import (
+    AxialAngle,
+    AxialDistance,
+    Coordinate,
+    JointCoordinateName,
+    coordinate_of,
+)
 from floatframe.model.forces import UserForce
 from floatframe.model.functions.expressions import Tape, compile_expression
 from floatframe.model.joints.axis_frame import axis_in_b, turning_frame
@@ -238,7 +244,7 @@ def add_coordinates(
 def find_coordinate(system: System, where: str, wanted: Coordinate | str, made: Connections) -> PlacedCoordinate:
     """Return a coordinate in the assembled position; `ModelError` suggests the closest name if it does not exist."""
     coordinate = coordinate_of(where, wanted)
-    if isinstance(coordinate, JointCoordinate):
+    if isinstance(coordinate, JointCoordinateName):
         return coordinate_of_joint(system, where, coordinate, made)
     a = find_marker(system, f"{where}: marker_a", coordinate.marker_a)
     b = find_marker(system, f"{where}: marker_b", coordinate.marker_b)
@@ -256,7 +262,7 @@ def find_coordinate(system: System, where: str, wanted: Coordinate | str, made: 
     return PlacedCoordinate(a, b, RowCoordinate("", SPAN))
 
 
-def coordinate_of_joint(system: System, where: str, wanted: JointCoordinate, made: Connections) -> PlacedCoordinate:
+def coordinate_of_joint(system: System, where: str, wanted: JointCoordinateName, made: Connections) -> PlacedCoordinate:
     """Return a coordinate of a joint in the assembled position."""
     names = [joint.name for joint in system.joints]
     if wanted.joint not in names:

@@ -15,7 +15,8 @@ from floatframe.errors import ModelError
 from floatframe.model.forces import BodyLoad, JointForce, PointForce
 from floatframe.model.functions.time_functions import TimeFunction, constant
 from floatframe.model.system import System
-from floatframe.results.sensors.channels import Channel, CoordinateChannel
+from floatframe.results.sensors.channels import Channel
+from floatframe.results.sensors.joint_coordinate import JointCoordinate
 from floatframe.results.sensors.measurement import amplitude_unit, unit_words
 from floatframe.simulation.held_functions import force_numbers
 
@@ -41,9 +42,9 @@ class HeldInput:
         return [(self.name, self.unit), (f"{self.name}.rate", per_time[0]), (f"{self.name}.acceleration", per_time[1])]
 
 
-def force_channels(system: System) -> list[Channel | CoordinateChannel]:
+def force_channels(system: System) -> list[Channel | JointCoordinate]:
     """Return the inputs of a system that are forces; drives are separate inputs, and bases are not supported."""
-    return [each for each in inputs_of(system.inputs) if isinstance(each, Channel | CoordinateChannel)]
+    return [each for each in inputs_of(system.inputs) if isinstance(each, Channel | JointCoordinate)]
 
 
 def is_constant(function: TimeFunction | float | None) -> bool:

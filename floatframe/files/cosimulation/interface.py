@@ -17,6 +17,7 @@ from floatframe.results.sensors import (
     AngleSensor,
     DisplacementSensor,
     ElongationSensor,
+    JointCoordinate,
     ModeSensor,
     MomentumSensor,
     PlaceSensor,
@@ -154,9 +155,8 @@ def output_variables(unit: Unit, system: System) -> Iterator[Variable]:
         is_of_state = isinstance(sensor, OF_THE_STATE) or (
             isinstance(sensor, PlaceSensor) and sensor.quantity != "acceleration"
         )
-        kind = type(sensor).__name__
         for column, values in measurement.columns.items():
-            feeds = not (is_of_state or (kind == "CoordinateSensor" and column in COLUMNS_OF_THE_STATE))
+            feeds = not (is_of_state or (isinstance(sensor, JointCoordinate) and column in COLUMNS_OF_THE_STATE))
             name, words = f"{sensor.name}.{column}", f"{column} of sensor {sensor.name}"
             unit_words = measurement.units[column]
             symbol = "" if unit_words == "-" or column in measurement.numbers else unit_words

@@ -31,7 +31,7 @@ from floatframe.errors import ModelError, UrdfError
 from floatframe.files.importers.frames import Frame
 from floatframe.files.importers.mesh_files import mesh_of, mesh_path
 from floatframe.files.importers.robot import MeshFile, Picture, Robot, RobotJoint
-from floatframe.model.bodies.coordinates import JointCoordinate
+from floatframe.model.bodies.coordinates import JointCoordinateName
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.bodies.ground import GROUND
 from floatframe.model.bodies.markers import Marker
@@ -122,9 +122,9 @@ class RobotSystem:
             )
         return Marker(body, position=frame.x, triad=frame.R)
 
-    def coordinate(self, joint: str) -> JointCoordinate:
+    def coordinate(self, joint: str) -> JointCoordinateName:
         """Return the coordinate of a joint with a position, for couplers, forces and sensors."""
-        return JointCoordinate(joint, coordinate_of(self.robot, joint))
+        return JointCoordinateName(joint, coordinate_of(self.robot, joint))
 
     def offset(self, joint: str) -> float:
         """Return the joint value at zero coordinate: value = offset + coordinate."""
@@ -508,9 +508,9 @@ class Builder:
         """(5): return the coupler of a joint to its leader, or its stops at the limits."""
         if not joint.has_value or joint.name in self.drives:
             return []
-        own = JointCoordinate(joint.name, coordinate_of(self.robot, joint.name))
+        own = JointCoordinateName(joint.name, coordinate_of(self.robot, joint.name))
         if joint.mimic is not None:
-            leader = JointCoordinate(joint.mimic.joint, coordinate_of(self.robot, joint.mimic.joint))
+            leader = JointCoordinateName(joint.mimic.joint, coordinate_of(self.robot, joint.mimic.joint))
             factor = joint.mimic.multiplier
             terms = [(own, 1.0)] + [(leader, -factor)] * (factor != 0)
             offsets = [offset_of(self.robot, self.values, name) for name in (joint.name, joint.mimic.joint)]

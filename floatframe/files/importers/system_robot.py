@@ -36,7 +36,7 @@ from floatframe.files.importers.robot import (
     Robot,
     RobotJoint,
 )
-from floatframe.model.bodies.coordinates import JointCoordinate
+from floatframe.model.bodies.coordinates import JointCoordinateName
 from floatframe.model.bodies.ground import GROUND
 from floatframe.model.bodies.rigid_body import RigidBody
 from floatframe.model.forces import Gravity, JointForce
@@ -311,7 +311,7 @@ class Exporter:
 
 def joint_terms(coupler: CoordinateCoupler) -> list[tuple[str, float]] | None:
     """Return the joints of a coupler with their factors; None if it couples other coordinates."""
-    if not all(isinstance(coordinate, JointCoordinate) for coordinate, _ in coupler.terms):
+    if not all(isinstance(coordinate, JointCoordinateName) for coordinate, _ in coupler.terms):
         return None
     return [(coordinate.joint, factor) for coordinate, factor in coupler.terms]  # type: ignore[union-attr]
 

@@ -36,7 +36,8 @@ from floatframe.results.sensors import (
     Sensor,
 )
 from floatframe.results.sensors.body_loads import INTERFACE_AXES
-from floatframe.results.sensors.channels import QUANTITIES, RATES, Channel, CoordinateChannel, StressChannel
+from floatframe.results.sensors.channels import QUANTITIES, RATES, Channel, StressChannel
+from floatframe.results.sensors.joint_coordinate import JointCoordinate
 from floatframe.results.sensors.loads import AXES
 from floatframe.results.sensors.measurement import owner_and_column
 from floatframe.results.sensors.places import PLACE_QUANTITIES
@@ -61,19 +62,20 @@ __all__ = [
 MESH = ("node", "element", "set")  #: keys that specify a place in the user's mesh
 AT = ("marker", *MESH, "tolerance")  #: keys of a place
 
-#: keys of the tables for positions, which are combined from several keys; those before "|" are required
-KEYS_OF_PLACES: dict[type[Sensor], tuple[str, ...]] = {
+#: keys of the tables that differ from the fields of the sensor; those before "|" are required
+KEYS: dict[type[Sensor], tuple[str, ...]] = {
     PlaceSensor: ("body", "|", *AT, "relative_to", "relative_marker"),
     AngleSensor: ("body_a", "body_b", "|", "marker_a", "marker_b", "axis"),
     DisplacementSensor: ("body", "|", *AT),
     ElongationSensor: ("body", "position_a", "position_b", "|", "tolerance"),
+    JointCoordinate: ("joint", "coordinate", "|"),
 }
 
 
 def keys_of(kind: type[Sensor]) -> tuple[str, ...]:
     """Return the keys of the table of a sensor: the fields of its class but the name; those before "|" are required."""
-    if kind in KEYS_OF_PLACES:
-        return KEYS_OF_PLACES[kind]
+    if kind in KEYS:
+        return KEYS[kind]
     given = [each for each in fields(kind) if each.name != "name"]
     needed = [each.name for each in given if each.default is MISSING and each.default_factory is MISSING]
     return (*needed, "|", *(each.name for each in given if each.name not in needed))
@@ -157,7 +159,7 @@ class SensorSection(Table):
         }
         given = {key: np.array(value) if isinstance(value, tuple) else value for key, value in given.items()}
         kind: Any = SENSORS[self.type]
-        return cast(Sensor, kind(name, **given))
+        return cast(Sensor, kind(name=name, **given))
 
     @property
     def limit(self) -> float:
@@ -292,10 +294,10 @@ class ChannelSection(Table):
             raise ValueError("coordinate: missing; expected a coordinate of the joint")
         return way
 
-    def place_or_coordinate(self, name: str, rate: int = 0) -> Channel | CoordinateChannel:
+    def place_or_coordinate(self, name: str, rate: int = 0) -> Channel | JointCoordinate:
         """Return the channel of the table."""
         if self.way() == "joint":
-            return CoordinateChannel(name, str(self.joint), str(self.coordinate), rate)
+            return JointCoordinate(str(self.joint), str(self.coordinate), name, rate)
         seen_from = None if self.relative_to is None else marker_at(self.relative_to, self.relative_marker)
         direction = np.array(self.direction or (1.0, 0.0, 0.0))
         return Channel(

@@ -9,7 +9,13 @@ from cms.body.address import Address
 from fe_models.foundation.toml_file import Matrix3, Table, Vector3, choice
 from floatframe.errors import ModelError
 from floatframe.files.system_file.place_key import PlaceOnBody
-from floatframe.model.bodies.coordinates import AxialAngle, AxialDistance, Coordinate, JointCoordinate, PointDistance
+from floatframe.model.bodies.coordinates import (
+    AxialAngle,
+    AxialDistance,
+    Coordinate,
+    JointCoordinateName,
+    PointDistance,
+)
 from floatframe.model.bodies.markers import Marker
 
 __all__ = ["CoordinateSection", "NamedCoordinate", "marker_of", "of_joint"]
@@ -34,7 +40,7 @@ def of_joint(value: Any) -> Any:
     if not isinstance(table, dict) or table.keys() & {"joint", "type", "body"}:
         return table
     try:
-        found = JointCoordinate.of_name(str(table.get("coordinate", "")))
+        found = JointCoordinateName.of_name(str(table.get("coordinate", "")))
     except ModelError:
         if isinstance(value, str):
             raise ValueError("expected a coordinate of a joint, such as 'hub.angle', or a table") from None
@@ -92,7 +98,7 @@ class CoordinateSection(Table):
         """Return the coordinate of the table."""
         if self.joint is not None:
             assert self.coordinate is not None  # ensured by the validation of the table
-            return JointCoordinate(self.joint, self.coordinate)
+            return JointCoordinateName(self.joint, self.coordinate)
         assert self.body_a is not None  # ensured by the validation of the table
         assert self.body_b is not None
         a = marker_of(self.body_a, self.marker_a, self.triad_a)

@@ -19,7 +19,6 @@ from floatframe.design.generation.recursions import Recursion, inverse_dynamics
 from floatframe.engine.tree.recursive import relative_model
 from floatframe.errors import ModelError
 from floatframe.machines.flexible_arm.collocation import OptimalMove
-from floatframe.model.bodies.coordinates import JointCoordinate
 from floatframe.model.forces import UserForce
 from floatframe.model.functions.time_functions import TimeFunction
 from floatframe.model.system import System
@@ -77,8 +76,8 @@ def limited(torque: str, largest: float) -> str:
 
 def user_force(name: str, torques: Mapping[str, str], functions: Mapping[str, TimeFunction]) -> UserForce:
     """Return torques at hinges as a user force that reads their angles and rates."""
-    seen = {joint: JointCoordinate(joint, "angle") for joint in torques}
-    return UserForce(name, seen, forces=dict(torques), functions=dict(functions))
+    angles = {joint: f"{joint}.angle" for joint in torques}
+    return UserForce(name, angles, forces=dict(torques), functions=dict(functions))
 
 
 def computed_torque(

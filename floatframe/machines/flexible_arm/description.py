@@ -13,7 +13,7 @@ from floatframe.model.bodies.markers import Marker
 from floatframe.model.bodies.mode_choice import frozen_to_rigid, with_modes
 from floatframe.model.joints import RevoluteJoint
 from floatframe.model.system import System
-from floatframe.results.sensors import CoordinateSensor, PlaceSensor
+from floatframe.results.sensors import JointCoordinate, PlaceSensor
 
 __all__ = ["BENDING", "LENGTH", "FlexibleLinks", "arm", "links"]
 
@@ -61,6 +61,6 @@ def arm(parts: FlexibleLinks, *, modes: Sequence[int] | None = None, is_rigid: b
         RevoluteJoint("shoulder", Marker(GROUND), Marker("upper", "shoulder"), axis=axis),
         RevoluteJoint("elbow", Marker("upper", "elbow"), Marker("forearm", "elbow"), axis=axis),
     )
-    sensors: list[PlaceSensor | CoordinateSensor] = [PlaceSensor("tip", TIP)]
-    sensors += [CoordinateSensor(joint, joint, "angle") for joint in ("shoulder", "elbow")]
+    sensors: list[PlaceSensor | JointCoordinate] = [PlaceSensor("tip", TIP)]
+    sensors += [JointCoordinate(joint, "angle", joint) for joint in ("shoulder", "elbow")]
     return System(tuple(bodies), joints, name="flexible arm", sensors=tuple(sensors))

@@ -19,7 +19,7 @@ from floatframe.machines.motor_bogie.description import ENDS, MotorBogie
 from floatframe.model.system import System
 from floatframe.results.element_motion import element_motion
 from floatframe.results.sensors import measured
-from floatframe.results.sensors.channels import CoordinateChannel
+from floatframe.results.sensors.joint_coordinate import JointCoordinate
 from floatframe.results.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -60,8 +60,8 @@ def at_rest(system: System, load: str = "leading_lower", column: str = "force x"
     sensor = next((each for each in system.sensors if each.name == load), None)
     if sensor is None:
         raise ModelError(f"at_rest: the system has no sensor {load!r}")
-    torques = [CoordinateChannel(f"torque {word}", f"{word}_spindle", "angle") for word in ENDS]
-    speed = CoordinateChannel("speed", "leading_spindle", "angle", 1)
+    torques = [JointCoordinate(f"{word}_spindle", "angle", f"torque {word}") for word in ENDS]
+    speed = JointCoordinate("leading_spindle", "angle", "speed", 1)
     return linearize(still, inputs=torques, outputs=[Column(cast(AnyOutput, sensor), column), speed])
 
 

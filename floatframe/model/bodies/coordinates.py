@@ -8,13 +8,13 @@ from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.checked_values import unit_vector
 
-__all__ = ["AxialAngle", "AxialDistance", "Coordinate", "JointCoordinate", "PointDistance", "coordinate_of"]
+__all__ = ["AxialAngle", "AxialDistance", "Coordinate", "JointCoordinateName", "PointDistance", "coordinate_of"]
 
 
 @dataclass(frozen=True)
 @checked_fields(ModelError)
-class JointCoordinate:
-    """A coordinate of a joint, a distance or an angle, free or prescribed; the text "hub.angle" stands for it.
+class JointCoordinateName:
+    """Names of a joint and of one of its coordinates, "hub.angle" as text; `JointCoordinate` adds the measurement.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class JointCoordinate:
     coordinate: str
 
     @staticmethod
-    def of_name(name: str) -> "JointCoordinate":
+    def of_name(name: str) -> "JointCoordinateName":
         """Return the coordinate for a text "joint.coordinate" or "joint coordinate".
 
         Raises
@@ -39,7 +39,7 @@ class JointCoordinate:
         joint, _, coordinate = name.rpartition("." if "." in name else " ")
         if not (joint and coordinate):
             raise ModelError(f"coordinate {name!r}: expected joint.coordinate, such as 'hub.angle'")
-        return JointCoordinate(joint, coordinate)
+        return JointCoordinateName(joint, coordinate)
 
 
 @frozen_copies
@@ -111,16 +111,18 @@ class PointDistance:
     marker_b: Marker
 
 
-Coordinate = JointCoordinate | AxialDistance | AxialAngle | PointDistance
+Coordinate = JointCoordinateName | AxialDistance | AxialAngle | PointDistance
 
 
 def coordinate_of(where: str, value: object) -> Coordinate:
-    """Return a coordinate, also from its name; `ModelError` if it is not a coordinate."""
+    """Return a coordinate, that of a joint as its names alone; `ModelError` if it is not a coordinate."""
     if isinstance(value, str):
         try:
-            return JointCoordinate.of_name(value)
+            return JointCoordinateName.of_name(value)
         except ModelError as error:
             raise ModelError(f"{where}: {error}") from None
+    if isinstance(value, JointCoordinateName):
+        return JointCoordinateName(value.joint, value.coordinate)
     if not isinstance(value, Coordinate):
         raise ModelError(
             f"{where}: expected a coordinate of a joint ('hub.angle', JointCoordinate), AxialDistance, AxialAngle or "

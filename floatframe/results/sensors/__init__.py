@@ -12,9 +12,10 @@ from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.system import System
 from floatframe.results.sensors.body_loads import InterfaceForceSensor, RecoverySensor, SpringSensor
-from floatframe.results.sensors.channels import Channel, CoordinateChannel, StressChannel
+from floatframe.results.sensors.channels import Channel, StressChannel
 from floatframe.results.sensors.elements import BushingSensor, ControlSensor, CouplerSensor, ElementSensor
-from floatframe.results.sensors.loads import CoordinateSensor, EnergySensor, ModeSensor, MomentumSensor, ReactionSensor
+from floatframe.results.sensors.joint_coordinate import JointCoordinate
+from floatframe.results.sensors.loads import EnergySensor, ModeSensor, MomentumSensor, ReactionSensor
 from floatframe.results.sensors.measurement import Measurement, Sensor, owner_and_column
 from floatframe.results.sensors.places import (
     PLACE_QUANTITIES,
@@ -41,14 +42,13 @@ __all__ = [
     "BushingSensor",
     "Channel",
     "ControlSensor",
-    "CoordinateChannel",
-    "CoordinateSensor",
     "CouplerSensor",
     "DisplacementSensor",
     "ElementSensor",
     "ElongationSensor",
     "EnergySensor",
     "InterfaceForceSensor",
+    "JointCoordinate",
     "Measurement",
     "ModeSensor",
     "MomentumSensor",
@@ -73,13 +73,13 @@ __all__ = [
 
 
 #: sensor classes by the `type` of a table [sensors.NAME]; a new sensor is added only here. The fields of a class are
-#: the keys of its table, unless `channel_section.KEYS_OF_PLACES` builds a place from several keys
+#: the keys of its table, unless `channel_section.KEYS` has others
 SENSORS: dict[str, type[Sensor]] = {
     **dict.fromkeys(PLACE_QUANTITIES, PlaceSensor),
     "angle": AngleSensor,
     "bushing": BushingSensor,
     "control": ControlSensor,
-    "coordinate": CoordinateSensor,
+    "coordinate": JointCoordinate,
     "coupler": CouplerSensor,
     "displacement": DisplacementSensor,
     "element": ElementSensor,
@@ -131,21 +131,17 @@ def sensors_of(system: System) -> tuple[Sensor, ...]:
     return cast(tuple[Sensor, ...], system.sensors)
 
 
-def coordinate_sensors(system: System) -> tuple[CoordinateSensor, ...]:
+def coordinate_sensors(system: System) -> tuple[JointCoordinate, ...]:
     """Return a sensor "joint.coordinate" for every coordinate of every joint; made once for a system."""
     return system.derived(make_coordinate_sensors)
 
 
-def make_coordinate_sensors(system: System) -> tuple[CoordinateSensor, ...]:
+def make_coordinate_sensors(system: System) -> tuple[JointCoordinate, ...]:
     """Return a new sensor for every coordinate of every joint."""
-    return tuple(
-        CoordinateSensor(f"{joint.name}.{coordinate}", joint.name, coordinate)
-        for joint in system.joints
-        for coordinate in joint.coordinates
-    )
+    return tuple(JointCoordinate(joint.name, coordinate) for joint in system.joints for coordinate in joint.coordinates)
 
 
-def named_coordinates(system: System) -> dict[str, CoordinateSensor]:
+def named_coordinates(system: System) -> dict[str, JointCoordinate]:
     """Return the sensors of all joint coordinates by their names "pin.angle" and "pin angle"."""
     sensors = coordinate_sensors(system)
     return {f"{each.joint}{sign}{each.coordinate}": each for sign in " ." for each in sensors}

@@ -15,7 +15,6 @@ from floatframe.model.bodies.markers import Marker
 from floatframe.model.checked_values import array_of_shape, unit_vector
 from floatframe.model.rotations import rotation_log
 from floatframe.model.system import System
-from floatframe.results.joint_coordinates import joint_coordinate
 from floatframe.results.sensors.linear_columns import scalar_columns
 from floatframe.results.sensors.measurement import Measurement, unit_words
 from floatframe.results.sensors.places import place_motion, require_turning, small_place
@@ -24,7 +23,7 @@ from floatframe.results.small_motions.rows import LinearColumns
 from floatframe.results.small_motions.small_motions import SmallMotions, SmallPlace
 from floatframe.results.trajectory import Trajectory
 
-__all__ = ["QUANTITIES", "RATES", "VALUE", "Channel", "CoordinateChannel", "StressChannel"]
+__all__ = ["QUANTITIES", "RATES", "VALUE", "Channel", "StressChannel", "rate_unit", "require_rate"]
 
 QUANTITIES = ("translation", "rotation")
 RATES = ("displacement", "velocity", "acceleration")
@@ -121,64 +120,6 @@ class Channel:
     def force_units(self, units: Units) -> str:
         """Return the unit of the channel as an input."""
         return unit_words(units, "moment" if self.quantity == "rotation" else "force")
-
-
-@frozen_copies
-@dataclass(frozen=True, eq=False)
-@checked_fields(ModelError)
-class CoordinateChannel:
-    """A joint coordinate; as an input, the force or torque along it.
-
-    Parameters
-    ----------
-    name
-        Name of the channel.
-    joint
-        Name of the joint.
-    coordinate
-        Name of the coordinate of the joint.
-    rate
-        Derivative of an output: 0 value, 1 first rate, 2 second rate.
-    """
-
-    name: str
-    joint: str
-    coordinate: str
-    rate: int = 0
-
-    def __post_init__(self) -> None:
-        require_rate(f"channel {self.name!r}", self.rate)
-
-    def measure(self, system: System, trajectory: Trajectory) -> Measurement:
-        """Return the coordinate or its rate over time; results do not contain second rates of coordinates."""
-        if self.rate == 2:
-            raise ModelError(
-                f"channel {self.name!r}: results over time do not contain second rates of joint coordinates; take "
-                'measure = "velocity", or the acceleration of a place'
-            )
-        found = joint_coordinate(system, trajectory, self.joint, self.coordinate)
-        value = (found.value, found.rate)[self.rate]
-        return Measurement(self.name, trajectory.t, {VALUE: value}, {VALUE: self.units(system.units)})
-
-    def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the coordinate as a linear function of small motions."""
-        rows = small.joint_coordinate(self.joint, self.coordinate, f"channel {self.name!r}")
-        for _ in range(self.rate):
-            rows = rows.rate
-        return scalar_columns({VALUE: rows}, {VALUE: self.units(small.system.units)})
-
-    @property
-    def is_angle(self) -> bool:
-        """Whether the coordinate is an angle rather than a distance."""
-        return self.coordinate.startswith("angle")
-
-    def units(self, units: Units) -> str:
-        """Return the unit of the channel as an output."""
-        return rate_unit(units, self.is_angle, self.rate)
-
-    def force_units(self, units: Units) -> str:
-        """Return the unit of the channel as an input."""
-        return unit_words(units, "moment" if self.is_angle else "force")
 
 
 @frozen_copies

@@ -1,4 +1,4 @@
-"""Sensors of joint loads and coordinates, of energies and momenta, and of modal coordinates."""
+"""Sensors of joint loads, of energies and momenta, and of modal coordinates."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ from floatframe.model.forces import Bushing
 from floatframe.model.joints.rows import MOMENT
 from floatframe.model.rotations import tilde
 from floatframe.model.system import System
-from floatframe.results.joint_coordinates import end_motion, force_rows, joint_coordinate
+from floatframe.results.joint_coordinates import end_motion
 from floatframe.results.recovery import require_same_modes
 from floatframe.results.sensors.linear_columns import NO_SIZE, scalar_columns, vector_linear
 from floatframe.results.sensors.measurement import Measurement, unit_words, vector_columns
@@ -25,7 +25,7 @@ from floatframe.results.small_motions.rows import LinearColumns
 from floatframe.results.small_motions.small_motions import SmallMotions
 from floatframe.results.trajectory import Energies, Trajectory
 
-__all__ = ["AXES", "CoordinateSensor", "EnergySensor", "ModeSensor", "MomentumSensor", "ReactionSensor"]
+__all__ = ["AXES", "EnergySensor", "ModeSensor", "MomentumSensor", "ReactionSensor"]
 
 AXES = ("ground", "marker")
 ROUNDING = 1e-12  #: magnitude, relative to the largest wrench, below which a value is a rounding error
@@ -108,49 +108,6 @@ class ReactionSensor:
         if isinstance(spring, Bushing):
             return bushing_markers(system, spring, compiled_system(system).placed)[0]
         return find_marker(system, f"force {self.of!r}: marker_a", spring.marker_a)  # type: ignore[union-attr]
-
-
-@frozen_copies
-@dataclass(frozen=True, eq=False)
-@checked_fields(ModelError)
-class CoordinateSensor:
-    """A coordinate of a joint: value, rate, and the force along it.
-
-    Parameters
-    ----------
-    name
-        Name of the sensor, unique in the system.
-    joint
-        Name of the joint.
-    coordinate
-        Name of the coordinate of the joint.
-    """
-
-    name: str
-    joint: str
-    coordinate: str
-
-    def measure(self, system: System, trajectory: Trajectory) -> Measurement:
-        """Return value, rate and force over time."""
-        found = joint_coordinate(system, trajectory, self.joint, self.coordinate)
-        value, force = ("angle", "moment") if found.is_angle else ("length", "force")
-        rate = "angular speed" if found.is_angle else "speed"
-        units = {"value": value, "rate": rate, "force": force}
-        return Measurement(
-            self.name,
-            trajectory.t,
-            {"value": found.value, "rate": found.rate, "force": found.force},
-            {key: unit_words(system.units, what) for key, what in units.items()},
-        )
-
-    def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return value and rate as linear functions of small motions; the force also depends on wrenches."""
-        value = small.joint_coordinate(self.joint, self.coordinate, f"sensor {self.name!r}")
-        force = force_rows(small, self.joint, self.coordinate)
-        units, columns = dict(self.measure(small.system, small.now).units), {"value": value, "rate": value.rate}
-        if force is None:
-            return LinearColumns(columns, units, {"force": "the force along a line with variable direction"})
-        return scalar_columns(columns | {"force": force}, units)
 
 
 @frozen_copies

@@ -28,8 +28,6 @@ from floatframe.sensors import (
     AngleSensor,
     Channel,
     ControlSensor,
-    CoordinateChannel,
-    CoordinateSensor,
     CouplerSensor,
     DisplacementSensor,
     ElongationSensor,
@@ -102,14 +100,14 @@ def sensors():
         SpringSensor("spring", "stay"),
         AngleSensor("angle", places[2], places[1], axis=(0.6, 0, 0.8)),
         ControlSensor("control", "control"), CouplerSensor("gear", "gear"),
-        CoordinateSensor("root angle", "root", "angle"), CoordinateSensor("axle angle", "axle", "angle"),
+        JointCoordinate("root", "angle", "root angle"), JointCoordinate("axle", "angle", "axle angle"),
         DisplacementSensor("bend", places[2]), DisplacementSensor("node", places[0]),
         ElongationSensor("gauge", "arm", node, other), ModeSensor("mode", "arm", 2), MomentumSensor("momentum"),
         StressSensor("stress", "arm", position=node), VonMisesSensor("vm", "arm"),
         StrainGauge("strain", "arm", (0.6, 0, 0.8), 2e3, 0.3, position=node),
         Channel("across", places[1], (0, 0.6, 0.8), rate=2),
         Channel("against", places[2], (1, 0, 0), relative_to=places[1], rate=1),
-        CoordinateChannel("turning", "axle", "angle", rate=1),
+        JointCoordinate("axle", "angle", "turning", rate=1),
     ]  # fmt: skip
 
 

@@ -30,8 +30,9 @@ from floatframe.analyses import resolved_frequencies
 from floatframe.analyses.snapshot import snapshot
 from floatframe.cli.app import app
 from floatframe.errors import ModelError
+from floatframe.joints import JointCoordinate
 from floatframe.results.sensors import StressSensor
-from floatframe.sensors import Channel, CoordinateChannel, StressChannel
+from floatframe.sensors import Channel, StressChannel
 from tests.floatframe.cli.examples import PENDULUM
 from tests.floatframe.point_masses import PointMasses, random_point_masses, reduced_body, stiffness
 
@@ -68,7 +69,7 @@ def test_velocity_and_acceleration_outputs_are_those_of_the_oscillator_in_both_f
 def test_joint_coordinate_is_input_and_output():
     rod = RigidBody("rod", 2.0, np.diag([1e-3, 0.2, 0.2]), center_of_mass=(0.5, 0, 0))
     hinge = RevoluteJoint("hinge", GROUND, Marker("rod"), axis=(0, 0, 1))
-    turn = CoordinateChannel("turn", "hinge", "angle")
+    turn = JointCoordinate("hinge", "angle", "turn", rate=0)
     linear = linearize(System([rod], [hinge], [Gravity((0, -9.81, 0))]), inputs=[turn], outputs=[turn])
     f = np.array([0.0, 0.3, 2.0])
     exact = 1 / (9.81 * 2.0 * 0.5 - (2 * np.pi * f) ** 2 * (0.2 + 2.0 * 0.25))
@@ -146,7 +147,7 @@ def test_resonances_are_met_by_their_frequencies():
             "no flexible body 'mass'",
         ),
         (
-            lambda: linearize(oscillator(), outputs=[CoordinateChannel("c", "pin", "angle")]),
+            lambda: linearize(oscillator(), outputs=[JointCoordinate("pin", "angle", "c", rate=0)]),
             "no joint coordinate 'pin.angle'",
         ),
         (lambda: Channel("c", Marker("mass"), rate=3), "rate: expected 0, 1 or 2"),

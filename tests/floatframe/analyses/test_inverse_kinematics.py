@@ -11,8 +11,7 @@ from floatframe.components.mechanisms import slider_crank
 from floatframe.errors import ModelError
 from floatframe.files.importers.read_urdf import read_urdf
 from floatframe.files.importers.robot_system import robot_system
-from floatframe.joints import CoordinateCoupler, Limits
-from floatframe.model.bodies.coordinates import JointCoordinate
+from floatframe.joints import CoordinateCoupler, JointCoordinate, Limits
 from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_matrix
 from tests.floatframe.files.importers.random_robots import random_robot
 

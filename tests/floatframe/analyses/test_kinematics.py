@@ -39,9 +39,9 @@ from floatframe.joints import (
 )
 from floatframe.model.functions.time_functions import constant, harmonic, polynomial_of_time
 from floatframe.model.rotations import rotation_matrix
-from floatframe.results import joint_coordinate
-from floatframe.results.joint_coordinates import joint_coordinates
+from floatframe.results.sensors import coordinate_sensors
 from floatframe.results.small_motions.joint_rates import coordinate_rows
+from floatframe.sensors import measured
 from tests.floatframe.examples import parallelogram
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 
@@ -83,8 +83,8 @@ def test_rocker_of_a_driven_four_bar_is_that_of_the_integrated_motion():
     system = four_bar(drive=harmonic(1.0, 3.0))
     motion = kinematics(system, np.linspace(0, 1, 11))
     computed = integrate(system, GeneralizedAlpha(0.8), 1.0, 1e-3, output_every=100)
-    for name, found in joint_coordinates(system, motion).items():
-        other = joint_coordinates(system, computed)[name]
+    for name, found in measured(system, motion, coordinate_sensors(system)).items():
+        other = measured(system, computed, coordinate_sensors(system))[name]
         assert_allclose(found.value, other.value, rtol=0, atol=1e-7)
         assert_allclose(found.rate, other.rate, rtol=0, atol=1e-4)
 
@@ -210,7 +210,7 @@ def test_results_in_a_file_are_those_in_memory(tmp_path):
         assert_allclose(file.source.read(name), memory.source.read(name), rtol=0, atol=0)
     assert file.head.run["integrator"] == "Kinematics"
     assert file.is_complete
-    value = joint_coordinate(CRANK, file, "main", "angle").value
+    value = JointCoordinate("main", "angle").measure(CRANK, file).value
     assert_allclose(value, OMEGA * times, rtol=0, atol=ROUNDOFF)
 
 
@@ -242,7 +242,7 @@ def test_rates_of_joint_coordinates_are_those_of_the_motion(joint):
     u = np.concatenate([R.T @ found.state.u[:3], found.state.u[3:]])
     assert set(rows) == {f"j.{name}" for name in joint.coordinates}
     for name, row in rows.items():
-        assert_allclose(row @ u, joint_coordinates(system, motion)[name].rate[0], rtol=0, atol=1e-12)
+        assert_allclose(row @ u, measured(system, motion, coordinate_sensors(system))[name].rate[0], rtol=0, atol=1e-12)
 
 
 def test_gears_pass_the_motion_of_a_drive_on():
@@ -254,7 +254,7 @@ def test_gears_pass_the_motion_of_a_drive_on():
         kinematics(System(wheels, hinges), [0.0, 1.0])
     system = System(wheels, hinges, couplers=[gear])
     motion = kinematics(system, np.linspace(0, 2, 9))
-    one, two = (joint_coordinate(system, motion, name, "angle") for name in ("one", "two"))
+    one, two = (JointCoordinate(name, "angle").measure(system, motion) for name in ("one", "two"))
     assert_allclose(two.value, -0.4 * one.value, rtol=0, atol=1e-11)
     assert_allclose(one.force, -(1 + 0.4**2) * 4.0 * np.sin(2 * motion.t), rtol=0, atol=1e-11)
 

@@ -9,11 +9,11 @@ from numpy.testing import assert_allclose
 from floatframe import JointForce, Marker, PointForce, UserForce, linearize, static_equilibrium
 from floatframe.analyses import ParameterInput, campbell, consistent_state, steady_rotation
 from floatframe.errors import ModelError
+from floatframe.joints import JointCoordinate
 from floatframe.results.sensors.places import PLACE_QUANTITIES, TURNING
 from floatframe.sensors import (
     AngleSensor,
     Channel,
-    CoordinateChannel,
     DisplacementSensor,
     InterfaceForceSensor,
     PlaceSensor,
@@ -76,7 +76,7 @@ def test_columns_about_a_steady_rotation_are_those_of_motions_near_by():
 INPUTS = {
     "push": (Channel("push", Marker("block", position=(0.1, 0, 0)), (0.6, 0, 0.8)), "force"),
     "twist": (Channel("twist", Marker("arm", "end_a"), (0, 0.6, 0.8), "rotation"), "torque"),
-    "motor": (CoordinateChannel("motor", "root", "angle"), "motor"),
+    "motor": (JointCoordinate("root", "angle", "motor", rate=0), "motor"),
     "stiffness": (ParameterInput("stiffness", "control", "k"), "k"),
 }
 

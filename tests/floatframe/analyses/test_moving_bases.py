@@ -25,8 +25,9 @@ from floatframe.analyses import BaseMotion, Column, DriveMotion, named_state_spa
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.newton_equations import displaced, in_ground_axes
 from floatframe.errors import ModelError
+from floatframe.joints import JointCoordinate
 from floatframe.model.functions.time_functions import constant, harmonic
-from floatframe.sensors import Channel, CoordinateSensor, MomentumSensor, PlaceSensor, ReactionSensor, measured
+from floatframe.sensors import Channel, MomentumSensor, PlaceSensor, ReactionSensor, measured
 from tests.floatframe.analyses.examples import machine, rotor, sensors
 
 F = np.array([0.0, 0.4, 1.3, 9.0, 60.0])  #: Hz, across all modes
@@ -166,8 +167,8 @@ def test_response_of_a_reaction_is_that_of_the_motion_under_a_harmonic_drive():
         rail = PrismaticJoint("rail", Marker(GROUND), Marker("table"), axis=(1, 0, 0), motions={"distance": motion})
         return System([table, block], [rail, pin], [Gravity((0, -9.81, 0)), spring])
 
-    outputs = [ReactionSensor("pin", "pin", "marker"), CoordinateSensor("rail", "rail", "distance"),
-               CoordinateSensor("swing", "pin", "angle")]  # fmt: skip
+    outputs = [ReactionSensor("pin", "pin", "marker"), JointCoordinate("rail", "distance", "rail"),
+               JointCoordinate("pin", "angle", "swing")]  # fmt: skip
     linear = linearize(driven(constant(0.0)), inputs=[DriveMotion("x", "rail", "distance", rate=0)], outputs=outputs)
     about, model = linear.equilibrium, compiled_system(driven(constant(0.0))).model
     z = np.linalg.solve(
@@ -196,7 +197,7 @@ def test_a_mass_on_a_shaken_spring_is_that_of_the_textbook():
     spring = SpringDamper("spring", Marker(GROUND, position=(-1, 0, 0)), Marker("mass"), k, c)
     outputs = [
         Channel("a", Marker("mass"), (1, 0, 0), rate=2),
-        CoordinateSensor("gap", "rail", "distance"),
+        JointCoordinate("rail", "distance", "gap"),
         Column(ReactionSensor("spring", "spring"), "force x"),
     ]
     s = 2j * np.pi * F

@@ -34,8 +34,7 @@ from floatframe.integrators import trapezoidal
 from floatframe.joints import AxialDistance, JointCoordinate, UniversalJoint
 from floatframe.model.bodies.mode_choice import with_modes
 from floatframe.model.rotations import euler_parameters, euler_parameters_of_rotation_vector, rotation_matrix
-from floatframe.results import joint_coordinate
-from floatframe.sensors import Channel, ControlSensor, CoordinateChannel, measured
+from floatframe.sensors import Channel, ControlSensor, measured
 
 LENGTH = 1.2
 
@@ -54,8 +53,8 @@ def rod():
 def linear(rod):
     """An arm in weightlessness: torque at its hinge, its angle and the place of its tip across it."""
     arm = pendulum(rod=rod, length=LENGTH, gravity=0.0)
-    outputs = [CoordinateChannel("angle", "hinge 1", "angle"), Channel("tip", Marker("rod 1", "end"), (0, 1, 0))]
-    return arm, linearize(arm, inputs=[CoordinateChannel("torque", "hinge 1", "angle")], outputs=outputs)
+    outputs = [JointCoordinate("hinge 1", "angle", "angle", rate=0), Channel("tip", Marker("rod 1", "end"), (0, 1, 0))]
+    return arm, linearize(arm, inputs=[JointCoordinate("hinge 1", "angle", "torque", rate=0)], outputs=outputs)
 
 
 def test_states_are_joint_coordinates_and_modes_with_units(linear):
@@ -71,8 +70,8 @@ def test_transfer_functions_are_those_of_the_matrices(linear):
     heavy = double_pendulum(angles=(-1.0, -1.2))
     other = linearize(
         heavy,
-        inputs=[CoordinateChannel("torque", "hinge 1", "angle")],
-        outputs=[CoordinateChannel("rate", "hinge 2", "angle", rate=1)],
+        inputs=[JointCoordinate("hinge 1", "angle", "torque", rate=0)],
+        outputs=[JointCoordinate("hinge 2", "angle", "rate", rate=1)],
     )
     assert set(named_state_space(other).states[:2]) == {"hinge 1.angle", "hinge 2.angle"}
     for each in (linear[1], other):
@@ -99,7 +98,7 @@ def test_slow_motions_are_right_beside_modes_a_million_times_as_fast(units):
     at_hinge, at_block = Marker(GROUND, position=np.zeros(3)), Marker("block", position=np.zeros(3))
     joints = [RevoluteJoint("hinge", at_hinge, Marker("beam", "start"), axis=e),
               FixedJoint("weld", Marker("beam", "end"), at_block)]  # fmt: skip
-    ends = [CoordinateChannel("torque", "hinge", "angle")], [CoordinateChannel("rate", "hinge", "angle", rate=1)]
+    ends = [JointCoordinate("hinge", "angle", "torque", rate=0)], [JointCoordinate("hinge", "angle", "rate", rate=1)]
     linear = linearize(System(bodies, joints, (), unit), inputs=ends[0], outputs=ends[1])
     space, s = named_state_space(linear), 2j * np.pi * of(0.01, time=-1)
     inertia = e @ J_block @ e + of(2.0 + 1 / 3 + 1e-3, 2, 1)  # of block and beam about the hinge
@@ -132,7 +131,7 @@ def test_joint_coordinates_of_a_held_body_are_no_states(apart, off):
     ]
     spring = JointForce("spring", "hinge", "angle", stiffness=k, damping=c)
     system = System(bodies, joints, [spring], redundant="minimum-norm")
-    push, angle = Channel("push", marker("A", 0.3, 0.1, 0.2), R[:, 1]), CoordinateChannel("angle", "hinge", "angle")
+    push, angle = Channel("push", marker("A", 0.3, 0.1, 0.2), R[:, 1]), JointCoordinate("hinge", "angle", rate=0)
     space = named_state_space(linearize(system, inputs=[push], outputs=[angle]))
     assert space.states == ("hinge.angle", "hinge.angle rate")
     e, r = R[:, 2], R @ np.array([0.1, 0.2, 0.05])
@@ -211,7 +210,7 @@ def closed_loop_states(arm, regulator, start, h, n_steps):
     motion = integrate(loop, trapezoidal(), n_steps * h, h, state=state)
     found, hinge, body = (
         measured(loop, motion)["r"].columns,
-        joint_coordinate(loop, motion, "hinge 1", "angle"),
+        JointCoordinate("hinge 1", "angle").measure(loop, motion),
         motion.body("rod 1"),
     )
     seen = [found[f"z{k}"] for k in range(len(z))]

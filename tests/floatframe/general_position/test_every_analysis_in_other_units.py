@@ -24,7 +24,8 @@ from floatframe import (
 )
 from floatframe.analyses import named_state_space
 from floatframe.forces import Bushing
-from floatframe.sensors import Channel, CoordinateChannel
+from floatframe.joints import JointCoordinate
+from floatframe.sensors import Channel
 from tests.floatframe.other_units import Other, in_units
 
 R = Rotation.from_rotvec([0.7, -0.4, 1.1]).as_matrix()
@@ -53,11 +54,11 @@ def system():
 INPUTS = (
     Channel("push", Marker("block", position=(0.05, 0, 0.02)), (0.6, 0, 0.8)),
     Channel("turn", Marker("block"), (0, 0.6, 0.8), "rotation"),
-    CoordinateChannel("torque", "hinge", "angle"),
+    JointCoordinate("hinge", "angle", "torque", rate=0),
 )
 OUTPUTS = (
     Channel("rate", TIP, (0, 1, 0), rate=1),
-    CoordinateChannel("angle", "hinge", "angle"),
+    JointCoordinate("hinge", "angle", "angle", rate=0),
     Channel("acceleration", Marker("block"), (1, 0, 0), rate=2),
 )
 GIVEN, SEEN = ("N", "N m", "N m"), ("m/s", "rad", "m/s^2")

@@ -37,8 +37,6 @@ from floatframe.results.sensors import (
     BushingSensor,
     Channel,
     ControlSensor,
-    CoordinateChannel,
-    CoordinateSensor,
     CouplerSensor,
     DisplacementSensor,
     ElementSensor,
@@ -128,13 +126,13 @@ def sensors():
     found = [PlaceSensor(f"place {each}", arm, each, Marker("rotor")) for each in PLACE_QUANTITIES]
     found += [Channel(f"channel {q} {rate}", arm, (0.6, 0, 0.8), q, tip, rate)
               for q in ("translation", "rotation") for rate in range(3)]  # fmt: skip
-    found += [CoordinateChannel(f"coordinate {rate}", "knee", "angle", rate) for rate in range(2)]
+    found += [JointCoordinate("knee", "angle", f"coordinate {rate}", rate=rate) for rate in range(2)]
     return [
         *found,
         AngleSensor("angle", tip, Marker("arm"), (0, 1, 0)),
         BushingSensor("bushing", "mount"),
         ControlSensor("control", "user"),
-        CoordinateSensor("knee", "knee", "angle"),
+        JointCoordinate("knee", "angle", "knee"),
         CouplerSensor("coupler", "latch"),
         DisplacementSensor("displacement", tip),
         ElementSensor("element", "motor"),
@@ -169,7 +167,7 @@ def elsewhere(units):
 
 
 def test_every_sensor_is_there():
-    assert {type(each) for each in sensors()} == {*SENSORS.values(), Channel, CoordinateChannel, StressChannel}
+    assert {type(each) for each in sensors()} == {*SENSORS.values(), Channel, StressChannel}
 
 
 @pytest.mark.parametrize("units", UNITS)

@@ -27,7 +27,6 @@ from floatframe.errors import ModelError
 from floatframe.joints import CoordinateCoupler, CylindricalJoint, JointCoordinate
 from floatframe.model.joints.coordinate_coupler import Limits
 from floatframe.model.rotations import euler_parameters
-from floatframe.results import joint_coordinate
 from floatframe.results.sensors import PlaceSensor
 from floatframe.simulation import Event
 from floatframe.simulation import integrate as integration
@@ -201,5 +200,5 @@ def test_an_arm_of_any_size_swings_alike(size, formulation):
     for each in (1.0, size):
         system = turned_arm(each)
         motion = integrate(system, GeneralizedAlpha(), 0.05, 2.5e-3, formulation=formulation)
-        angles.append(joint_coordinate(system, motion, "hinge", "angle").value)
+        angles.append(JointCoordinate("hinge", "angle").measure(system, motion).value)
     assert_allclose(angles[1], angles[0], rtol=0, atol=1e-8 * np.abs(angles[0]).max())

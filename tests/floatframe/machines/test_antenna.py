@@ -56,9 +56,8 @@ def test_drive_and_strut_forces_are_those_of_virtual_work(parts, name):
     system, _ = ff.read_system(folder / f"{name}.toml", SLOW)
     antenna = parameters_of(folder / f"{name}.toml", SLOW)
     motion = ff.kinematics(system, np.linspace(0.1, 0.9, 5) * antenna.duration)
-    drive, hinge = (
-        ff.results.joint_coordinate(system, motion, *of) for of in (("mast", "distance"), ("hinge_1", "angle"))
-    )
+    coordinates = ("mast", "distance"), ("hinge_1", "angle")
+    drive, hinge = (ff.joints.JointCoordinate(*of).measure(system, motion) for of in coordinates)
     theta, x = antenna.stowed + hinge.value, petal.center_of_mass
     mass, half = petal.gram[0, 0], strut.gram[0, 0] / 2
     g, wire = (0.0 if name == "space" else G), (G * mass * x[0] / GEOMETRY.elbow if name == "rig" else 0.0)
@@ -81,7 +80,7 @@ def test_quasi_static_shapes_change_forces_by_little_and_the_wires_take_the_weig
     for name in ("space", "rig", "bare"):
         system, _ = ff.read_system(folder / f"{name}.toml", {"n_petals": 3, "duration": 1e4})
         motion = ff.kinematics(system, [0.5e4, 0.7e4], elasticity=ff.analyses.quasi_static_bodies)
-        force[name] = ff.results.joint_coordinate(system, motion, "mast", "distance").force
+        force[name] = ff.joints.JointCoordinate("mast", "distance").measure(system, motion).force
     gravity = {name: np.abs(force[name] - force["space"]) for name in ("rig", "bare")}
     assert (gravity["rig"] < 0.35 * gravity["bare"]).all()
 
@@ -94,7 +93,7 @@ def test_latching_keeps_momentum_and_moves_the_spacecraft_as_the_centre_of_mass_
     motion = ff.integrate(system, ff.GeneralizedAlpha(), 6.0, 4e-3, output_every=5)
     (event,) = motion.head.summary["events"]
     after = motion.t > event["t"]
-    distance = ff.results.joint_coordinate(system, motion, "mast", "distance").value
+    distance = ff.joints.JointCoordinate("mast", "distance").measure(system, motion).value
     assert_allclose(distance[after], antenna.height[2], atol=1e-8)
     assert abs(event["impulse"]["latch"]) > 1e-3
     scale = np.abs(event["impulse"]["latch"])

@@ -89,7 +89,7 @@ def test_a_standing_wheel_spins_up_by_the_friction_of_the_ground_and_the_piston_
 def test_a_retracting_gear_follows_its_circles_and_the_jack_gives_what_it_gains(folder):
     system, _ = ff.read_system(folder / "retraction.toml")
     motion = ff.integrate(system, METHOD, 7.0, 4e-3)
-    theta = ff.results.joint_coordinate(system, motion, "hinge", "angle").value
+    theta = ff.joints.JointCoordinate("hinge", "angle").measure(system, motion).value
     jack = ff.results.element_motion(system, motion, "hydraulics").outputs
     exact = retraction(theta)
     assert theta[-1] > np.radians(88)

@@ -16,7 +16,7 @@ def test_a_leg_that_is_up_hangs_below_its_gland_as_a_cantilever(tmp_path):
     cms.write(reduced, tmp_path / "leg.h5")
     system, _ = ff.read_system(tmp_path / "retraction_flexible.toml")
     motion = ff.integrate(system, ff.GeneralizedAlpha(0.8, 1e-8), 7.0, 4e-3)
-    theta = ff.results.joint_coordinate(system, motion, "hinge", "angle").value
+    theta = ff.joints.JointCoordinate("hinge", "angle").measure(system, motion).value
     late = motion.t > 6.0
     assert theta[late].min() > np.radians(85)
     assert np.ptp(theta[late]) < 0.01  # it swings a little on its oil

@@ -121,7 +121,7 @@ def amplitudes(gear, speed, blow, ends):
     changes |= {"bodies.wheel.omega_B": [0, speed / 0.3421, 0], "forces.blow.force": [0, blow, 0]}
     system = gear(**changes)
     motion = ff.integrate(system, ff.GeneralizedAlpha(0.9, 1e-8), ends[-1], 1e-3)
-    angle = ff.results.joint_coordinate(system, motion, "swivel", "angle").value
+    angle = ff.joints.JointCoordinate("swivel", "angle").measure(system, motion).value
     spans = [(motion.t > end - 0.1) & (motion.t <= end) for end in ends]
     return [np.ptp(angle[span]) / 2 for span in spans], motion.body("carriage").v[spans[-1], 0].mean()
 

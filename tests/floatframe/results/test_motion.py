@@ -10,6 +10,7 @@ import floatframe as ff
 from fe_models.foundation.extras import MissingExtraError
 from floatframe.errors import ResultsError
 from floatframe.results.motion import motion_of
+from floatframe.results.sensors import coordinate_sensors
 from floatframe.results.trajectory import read_trajectory
 from tests.floatframe.results.examples import SYSTEM
 
@@ -24,7 +25,7 @@ def motion():
 
 
 def test_joint_coordinates_are_attributes_of_the_joint(motion):
-    pin, known = motion.joint("pin"), ff.results.joint_coordinates(SENSED, motion)
+    pin, known = motion.joint("pin"), ff.sensors.measured(SENSED, motion, coordinate_sensors(SENSED))
     for name in pin.coordinates:
         expected = known[f"pin.{name}"]
         assert_array_equal(getattr(pin, name), expected.value)

@@ -85,7 +85,7 @@ def test_a_linear_system_takes_names(system):
         system,
         inputs=[ff.analyses.ForceInput("a", "motor"), ff.analyses.ForceInput("b", "push"),
                 ff.sensors.Channel("c", ff.Marker("arm"), direction=(0, 0, 1))],
-        outputs=[ff.sensors.CoordinateChannel("a", "pin", "angle"), ff.analyses.Column(tip, "x"),
+        outputs=[ff.joints.JointCoordinate("pin", "angle", "a", rate=0), ff.analyses.Column(tip, "x"),
                  ff.analyses.Column(tip, "z")],
     )  # fmt: skip
     assert named.inputs == ("motor.torque", "push", "arm:z")
@@ -123,11 +123,11 @@ def test_a_colon_in_the_name_of_a_sensor_is_no_place(system):
 
 def test_a_user_force_and_a_coupler_take_the_name_of_a_coordinate(system):
     brake = next(force for force in system.forces if getattr(force, "name", "") == "brake")
-    assert brake.coordinates == {"phi": ff.joints.JointCoordinate("pin", "angle")}
+    given = ff.UserForce("u", {"phi": ff.joints.JointCoordinate("pin", "angle")}, forces={"phi": "-phi"})
+    assert brake.coordinates == given.coordinates
     assert ff.UserForce("u", {"phi": "pin angle"}, forces={"phi": "-phi"}).coordinates == brake.coordinates
-    assert ff.joints.CoordinateCoupler("c", [("pin.angle", 2.0)]).terms == (
-        (ff.joints.JointCoordinate("pin", "angle"), 2.0),
-    )
+    terms = [("pin.angle", 2.0)], [(ff.joints.JointCoordinate("pin", "angle"), 2.0)]
+    assert len({ff.joints.CoordinateCoupler("c", each).terms for each in terms}) == 1
 
 
 def test_measurements_gradients_events_and_outputs_read_a_column_by_dot_and_blank(system):
@@ -195,3 +195,18 @@ def test_an_equilibrium_as_a_motion_takes_the_names(system):
     assert_allclose(500.0 * angle, (2 * 9.81 - 1.0) * 0.5 * np.cos(angle), rtol=1e-9)
     assert_allclose(rest.sensor("tip z").z, [-np.sin(angle)], rtol=1e-12)
     assert rest.to_dataframe("tip").shape == (1, 4)
+
+
+def test_one_joint_coordinate_is_coordinate_sensor_input_and_output(system):
+    """A coupler and a user force, a measurement, the columns and matrices of a linear system, all by one object."""
+    angle = ff.joints.JointCoordinate("pin", "angle")
+    motion = ff.integrate(replace(system, sensors=[angle]), ff.GeneralizedAlpha(), 0.01, 1e-3)
+    assert_array_equal(angle.measure(system, motion).value, motion.joint("pin").angle)
+    assert motion.to_dataframe("pin.angle").columns.tolist() == ["pin.angle value", "pin.angle rate", "pin.angle force"]
+    one = ff.linearize(system, inputs=[angle], outputs=[replace(angle, rate=0)])
+    named = ff.linearize(system, inputs=["pin.angle"], outputs=["pin.angle"])
+    assert (one.inputs, one.outputs, one.output_units) == (named.inputs, named.outputs, ("rad",))
+    assert_array_equal(ff.frequency_response(one, [3.0]).values, ff.frequency_response(named, [3.0]).values)
+    whole = ff.linearize(system, inputs=[angle], outputs=[angle])
+    assert whole.outputs == ("pin.angle.value", "pin.angle.rate", "pin.angle.force")
+    assert [ff.joints.JointCoordinate("pin", "angle", rate=k).name for k in (0, 1)] == ["pin.angle", "pin.angle.rate"]

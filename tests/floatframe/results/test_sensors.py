@@ -28,13 +28,12 @@ from floatframe import (
 from floatframe.cli.app import app
 from floatframe.errors import ModelError
 from floatframe.files.system_file.read_system import read_system
+from floatframe.joints import JointCoordinate
 from floatframe.model.rotations import rotation_matrix
 from floatframe.pictures.body_colors import VON_MISES
-from floatframe.results import joint_coordinate
 from floatframe.results.place_motion import interface_motion, largest_von_mises, point_motion
 from floatframe.results.sensors import (
     AngleSensor,
-    CoordinateSensor,
     DisplacementSensor,
     ElongationSensor,
     EnergySensor,
@@ -106,7 +105,7 @@ def test_rotation_and_angular_velocity_are_those_of_the_axes(swing):
         turned[:, 1], -vector(system, swing, PlaceSensor("s", TIP, "rotation-vector", ARM_TIP))[:, 1], atol=1e-12
     )
     angle = AngleSensor("a", TIP, Marker("arm"), axis=(0, 1, 0)).measure(system, swing).columns["angle"]
-    hinge = CoordinateSensor("h", "knee", "angle").measure(system, swing).columns["value"]
+    hinge = JointCoordinate("knee", "angle", "h").measure(system, swing).columns["value"]
     assert_allclose(np.diff(angle), np.diff(hinge), rtol=0, atol=1e-6)
     assert np.ptp(hinge) > 0.1
 
@@ -254,7 +253,7 @@ def test_sensors_of_the_file_are_in_table_plot_and_record(spin):
         names, *rows = csv.reader(file)
     table = dict(zip(names, np.array(rows, dtype=float).T, strict=True))
     assert_allclose(table["tip x [mm/s]"], tip.columns["x"], rtol=0, atol=0)
-    rate = joint_coordinate(system, motion, "hinge", "angle").rate
+    rate = JointCoordinate("hinge", "angle").measure(system, motion).rate
     assert_allclose(table["hinge.angle rate [rad/s]"], rate, rtol=0, atol=0)
     assert "largest stress largest [MPa]" in names
     run("plot", results)

@@ -85,7 +85,7 @@ def system(rod, case, h=0.0):
 
 
 def angles(made, motion):
-    return ff.results.joint_coordinate(made, motion, "hinge", "angle").value
+    return ff.joints.JointCoordinate("hinge", "angle").measure(made, motion).value
 
 
 def run(made, rho, h, formulation, end=END, start=0.0, state=None):

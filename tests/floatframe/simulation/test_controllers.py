@@ -27,7 +27,7 @@ from floatframe import (
 from floatframe.errors import ModelError, ResultsError
 from floatframe.files.cosimulation.held_inputs import with_held_inputs
 from floatframe.integrators import Ida, RelativeOde
-from floatframe.model.bodies.coordinates import JointCoordinate
+from floatframe.joints import JointCoordinate
 from floatframe.model.forces import WITH_AMPLITUDE, BodyLoad, JointForce, UserForce
 from floatframe.model.functions.time_functions import constant, piecewise
 from floatframe.results.sensors import PlaceSensor

@@ -25,7 +25,6 @@ from floatframe.forces import Bushing
 from floatframe.integrators import EnergyMomentum, Variational, trapezoidal
 from floatframe.integrators.relative_ode import RelativeOde
 from floatframe.joints import CoordinateCoupler, JointCoordinate
-from floatframe.results import joint_coordinate
 from floatframe.results.sensors import PlaceSensor
 from floatframe.simulation import Event, resume
 from floatframe.simulation.event_steps import EventWatch
@@ -215,7 +214,7 @@ def test_what_a_latch_holds_does_not_happen_again():
     motion = integrate(system, GeneralizedAlpha(), 1.5, 5e-3)
     assert len(motion.head.summary["events"]) == 1
     late = motion.t > motion.head.summary["events"][0]["t"] + 0.01
-    assert_allclose(joint_coordinate(system, motion, "hinge", "angle").value[late], 1.2, rtol=0, atol=1e-9)
+    assert_allclose(JointCoordinate("hinge", "angle").measure(system, motion).value[late], 1.2, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("method", [GeneralizedAlpha(), EnergyMomentum(), Variational()])

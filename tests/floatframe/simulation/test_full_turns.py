@@ -35,7 +35,7 @@ from floatframe.joints import (
 )
 from floatframe.model.functions.time_functions import harmonic, polynomial_of_time
 from floatframe.model.rotations import rotation_matrix
-from floatframe.results import joint_coordinate, motion_table
+from floatframe.results import motion_table
 from floatframe.sensors import AngleSensor, measured
 from floatframe.simulation import Event, resume
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
@@ -71,7 +71,7 @@ def test_a_wheel_has_turned_by_speed_times_time(method, speed):
     system = on_axle(speed)
     motion = integrate(system, method, 0.5, 1e-3, output_every=100)
     assert len(motion.t) == 6
-    turned = joint_coordinate(system, motion, "axle", "angle")
+    turned = JointCoordinate("axle", "angle").measure(system, motion)
     assert_allclose(turned.value, speed * motion.t, rtol=1.1 * 0.1**2 / 3, atol=0)
     assert_allclose(turned.rate, speed, rtol=1e-6, atol=0)
     assert_allclose(measured(system, motion)["turned"].columns["angle"], turned.value, rtol=0, atol=1e-9)
@@ -82,7 +82,7 @@ def test_a_wheel_has_turned_by_speed_times_time(method, speed):
 def test_even_a_step_of_more_than_half_a_turn_is_counted():
     system = on_axle(1000.0)
     motion = integrate(system, GeneralizedAlpha(), 0.2, 0.01, output_every=4)  # 10 rad a step
-    assert_allclose(joint_coordinate(system, motion, "axle", "angle").value, 1000.0 * motion.t, rtol=1e-6, atol=0)
+    assert_allclose(motion.joint("axle").angle, 1000.0 * motion.t, rtol=1e-6, atol=0)
 
 
 JOINTS = {  # from the ground to the wheel, about its axis z
@@ -101,7 +101,7 @@ def test_every_joint_with_an_angle_counts_its_turns(kind):
     joint, name, sign = JOINTS[kind]
     system = System([wheel()], [joint])
     motion = integrate(system, GeneralizedAlpha(), 0.5, 1e-3, output_every=100)
-    found = joint_coordinate(system, motion, "j", name)
+    found = JointCoordinate("j", name).measure(system, motion)
     assert_allclose(found.value, sign * FAST * motion.t, rtol=1e-6, atol=1e-9)
 
 
@@ -112,7 +112,7 @@ def test_two_bodies_that_turn_have_the_angle_between_them():
               RevoluteJoint("b", Marker("wheel"), Marker("second"), axis=(0, 0, 1))]  # fmt: skip
     system = System([wheel(), second], joints)
     motion = integrate(system, GeneralizedAlpha(), 0.5, 1e-3, output_every=100)
-    assert_allclose(joint_coordinate(system, motion, "b", "angle").value, -3 * FAST * motion.t, rtol=1e-6, atol=0)
+    assert_allclose(motion.joint("b").angle, -3 * FAST * motion.t, rtol=1e-6, atol=0)
 
 
 def test_a_flexible_wheel_counts_its_turns_and_adds_its_elastic_ones():
@@ -122,7 +122,7 @@ def test_a_flexible_wheel_counts_its_turns_and_adds_its_elastic_ones():
     body = FlexibleBody("wheel", reduced, omega_B=(0, 0, FAST), velocity=np.cross(hub.position, (0, 0, FAST)))
     system = System([body], [RevoluteJoint("axle", GROUND, Marker("wheel", hub.name), axis=(0, 0, 1))])
     coarse, fine = (integrate(system, GeneralizedAlpha(), 0.2, 1e-4, output_every=n) for n in (1000, 10))
-    a, b = (joint_coordinate(system, motion, "axle", "angle").value for motion in (coarse, fine))
+    a, b = (motion.joint("axle").angle for motion in (coarse, fine))
     assert abs(b[-1]) > 15
     assert_allclose(a, b[::100], rtol=0, atol=1e-12)
 
@@ -136,7 +136,7 @@ def test_a_driven_angle_begins_where_its_drive_says():
         integrate(system, GeneralizedAlpha(), 0.4, 1e-3, output_every=100),
         kinematics(system, np.linspace(0.0, 0.4, 3)),
     ):
-        turned = joint_coordinate(system, motion, "axle", "angle").value
+        turned = motion.joint("axle").angle
         assert_allclose(turned, 4 * np.pi + 50 * motion.t, rtol=0, atol=1e-9)
 
 
@@ -146,7 +146,7 @@ def test_turns_are_counted_where_the_speed_changes_between_outputs():
     system = replace(on_axle(200.0), forces=[motor])
     motion = integrate(system, GeneralizedAlpha(), 0.5, 2.5e-4, output_every=1000)
     exact = 200.0 * motion.t - 8000.0 / 2 * motion.t**3 / 6
-    assert_allclose(joint_coordinate(system, motion, "axle", "angle").value, exact, rtol=0, atol=1e-3)
+    assert_allclose(motion.joint("axle").angle, exact, rtol=0, atol=1e-3)
 
 
 def test_results_on_disk_and_exports_have_the_turns(tmp_path):
@@ -156,7 +156,8 @@ def test_results_on_disk_and_exports_have_the_turns(tmp_path):
     motion = read_results(path)
     assert motion.head.angles is not None
     assert len(motion.head.angles) == 2  # the sensor has its zero elsewhere than the joint, or the same
-    assert_allclose(joint_coordinate(system, motion, "axle", "angle").value, FAST * motion.t, rtol=1e-6, atol=0)
+    turned = JointCoordinate("axle", "angle").measure(system, motion).value
+    assert_allclose(turned, FAST * motion.t, rtol=1e-6, atol=0)
     motion_table(motion, system=system).write(tmp_path / "wheel.csv")
     head, *_, last = (tmp_path / "wheel.csv").read_text().splitlines()
     columns = dict(zip(head.split(","), map(float, last.split(",")), strict=True))
@@ -194,7 +195,7 @@ def test_turns_go_on_after_an_event():
     motion = integrate(system, GeneralizedAlpha(), 1.0, 1e-3, output_every=100)
     assert [e["name"] for e in motion.head.summary["events"]] == ["push", "turned", "halt"]
     assert_allclose([e["t"] for e in motion.head.summary["events"]], [0.17, 0.40, 0.45], rtol=1e-6, atol=0)
-    assert_allclose(joint_coordinate(system, motion, "axle", "angle").value, FAST * motion.t, rtol=1e-6, atol=1e-9)
+    assert_allclose(motion.joint("axle").angle, FAST * motion.t, rtol=1e-6, atol=1e-9)
 
 
 def geared(**options):
@@ -211,7 +212,7 @@ def test_a_gear_holds_through_an_event():
     push = PointForce("push", Marker("wheel"), (1.0, 0, 0))
     system = geared(forces=[push], events=[Event("push", at=0.17, switch_on=("push",))])
     motion = integrate(system, GeneralizedAlpha(), 0.5, 1e-3, output_every=100)
-    a, b = (joint_coordinate(system, motion, name, "angle").value for name in "ab")
+    a, b = (JointCoordinate(name, "angle").measure(system, motion).value for name in "ab")
     assert_allclose(a, FAST * motion.t, rtol=1e-6, atol=1e-9)
     assert_allclose(b, -2 * a, rtol=1e-9, atol=1e-9)
 
@@ -223,7 +224,7 @@ def test_states_of_control_go_on_through_an_event():
                         rates={"s": "1 + 0 * phi"}, states={"s": 0.0})  # fmt: skip
     system = replace(on_axle(0.0), forces=[push, control], events=[Event("push", at=0.17, switch_on=("push",))])
     motion = integrate(system, GeneralizedAlpha(), 1.0, 1e-3, output_every=100)
-    assert_allclose(joint_coordinate(system, motion, "axle", "angle").value, motion.t**3 / 6, rtol=0, atol=1e-5)
+    assert_allclose(motion.joint("axle").angle, motion.t**3 / 6, rtol=0, atol=1e-5)
 
 
 def test_a_controller_sees_the_whole_angle_after_an_event():
@@ -233,7 +234,7 @@ def test_a_controller_sees_the_whole_angle_after_an_event():
     base = replace(on_axle(20.0), forces=[push, spring])  # 20 sin t
     pushed = replace(base, events=[Event("push", at=1.37, switch_on=("push",))])
     motion = integrate(pushed, GeneralizedAlpha(), 6.0, 2e-3, output_every=50)
-    assert_allclose(joint_coordinate(base, motion, "axle", "angle").value, 20 * np.sin(motion.t), rtol=0, atol=1e-3)
+    assert_allclose(motion.joint("axle").angle, 20 * np.sin(motion.t), rtol=0, atol=1e-3)
 
 
 def test_a_sensor_made_after_the_run_goes_by_the_rates_or_refuses():

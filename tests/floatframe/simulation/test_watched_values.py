@@ -26,8 +26,7 @@ from floatframe.errors import ConvergenceError
 from floatframe.integrators import EnergyMomentum, Variational
 from floatframe.integrators.integrator import memory_of_past
 from floatframe.integrators.relative import RelativeGeneralizedAlpha
-from floatframe.results import joint_coordinate
-from floatframe.results.sensors import CoordinateSensor
+from floatframe.joints import JointCoordinate
 from floatframe.simulation import Event
 from floatframe.simulation.passage import direct_values
 from floatframe.simulation.restart import restart_record
@@ -47,7 +46,7 @@ def test_an_angle_of_the_run_is_that_of_the_sensor(method, joint):
     motion = integrate(system, method, 3.0, 0.01)
     rows = type("Rows", (), {"angle": motion.source.read("angle")})
     assert watched is not None
-    expected = joint_coordinate(system, motion, joint, "angle").value
+    expected = JointCoordinate(joint, "angle").measure(system, motion).value
     assert np.abs(expected).max() > (np.pi if joint == "hinge" else 1.0)
     assert_allclose(watched(rows), expected, rtol=0, atol=1e-12)
 
@@ -108,7 +107,7 @@ def test_results_between_events_are_not_needed_to_find_them():
     mark = Event("mark", "hinge.angle", 4.5 * np.pi, record=True)
     never = Event("never", "speed", 100.0, column="rate", record=True)
     plain = System([wheel], [hinge], events=[mark])
-    full = System([wheel], [hinge], events=[mark, never], sensors=[CoordinateSensor("speed", "hinge", "angle")])
+    full = System([wheel], [hinge], events=[mark, never], sensors=[JointCoordinate("hinge", "angle", "speed")])
     motions = [integrate(system, GeneralizedAlpha(), 5.0, 0.01, output_every=7) for system in (plain, full)]
     assert len(motions[0].head.summary["events"]) == 1
     assert motions[0].head.summary["events"] == motions[1].head.summary["events"]

@@ -147,7 +147,7 @@ def falling_rod(frame, damper, h, rho, formulation):
     rate, J = 0.785 * 9.81 / 2, 0.785 / 3  # torque and inertia about the hinge
     t, c = motion.t[-1], damper / J
     exact = rate / J * t**2 / 2 if not damper else rate / damper * (t - (1 - np.exp(-c * t)) / c)
-    return motion, -ff.results.joint_coordinate(system, motion, "hinge", "angle").value[-1], exact
+    return motion, -ff.joints.JointCoordinate("hinge", "angle").measure(system, motion).value[-1], exact
 
 
 def motor_in_hinge(method, turn):

@@ -21,8 +21,8 @@ from floatframe.analyses import snapshot, steady_rotation
 from floatframe.engine.tree.topology import tree_of
 from floatframe.errors import ConvergenceError
 from floatframe.forces import Bushing
+from floatframe.joints import JointCoordinate
 from floatframe.model.rotations import euler_parameters_of_rotation_vector
-from floatframe.results import joint_coordinate
 from tests.floatframe.analyses.relative.examples import CASES
 from tests.floatframe.engine.tree.mechanisms import MECHANISMS, falling
 from tests.floatframe.model.elements.laws import Jack
@@ -81,7 +81,7 @@ def test_a_long_chain_with_springs_hangs_as_its_coordinates_say():
     system = System(links, hinges, [Gravity((0.0, -G, 0.0)), *springs])
     rest = static_equilibrium(system, formulation="relative")
     still = snapshot(system, rest)
-    angles = np.array([joint_coordinate(system, still, f"hinge {k}", "angle").value[0] for k in range(n)])
+    angles = np.array([JointCoordinate(f"hinge {k}", "angle").measure(system, still).value[0] for k in range(n)])
     x = rest.state.r[:, 0] - length / 2 * np.cos(np.cumsum(angles))  # of the hinges
     moments = [mass * G * (rest.state.r[k:, 0] - x[k]).sum() for k in range(n)]
     assert_allclose(-stiffness * angles, moments, rtol=1e-7)

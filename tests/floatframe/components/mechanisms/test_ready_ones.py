@@ -18,9 +18,9 @@ from floatframe.components.mechanisms import (
     spinning_top,
 )
 from floatframe.errors import ModelError
+from floatframe.joints import JointCoordinate
 from floatframe.model.functions.time_functions import cycloidal_spin_up, polynomial_of_time
 from floatframe.model.rotations import rotation_exp, rotation_matrix
-from floatframe.results.joint_coordinates import joint_coordinate
 from floatframe.results.place_motion import interface_motion, point_motion
 
 
@@ -47,7 +47,7 @@ def test_slider_goes_where_the_crank_says():
     r, l = 0.15, 0.3  # noqa: E741
     system = slider_crank(crank=r, rod=l, drive=cycloidal_spin_up(20.0, 0.2))
     motion = integrate(system, GeneralizedAlpha(0.8), 0.4, 1e-3)
-    phi = joint_coordinate(system, motion, "main", "angle").value
+    phi = JointCoordinate("main", "angle").measure(system, motion).value
     exact = r * np.cos(phi) + np.sqrt(l**2 - (r * np.sin(phi)) ** 2)
     assert phi[-1] > 5
     assert_allclose(point_motion(motion, "slider", (0, 0, 0)).position[:, 0], exact, rtol=0, atol=1e-9)
@@ -56,7 +56,7 @@ def test_slider_goes_where_the_crank_says():
 def test_torque_of_the_drive_does_the_work_that_the_mechanism_gains():
     system = slider_crank(drive=cycloidal_spin_up(20.0, 0.2), angle=0.3)
     motion = integrate(system, GeneralizedAlpha(0.9), 0.3, 2e-4)
-    main = joint_coordinate(system, motion, "main", "angle")
+    main = JointCoordinate("main", "angle").measure(system, motion)
     work = np.sum(np.diff(main.t) * (main.force[1:] * main.rate[1:] + main.force[:-1] * main.rate[:-1]) / 2)
     assert_allclose(work, motion.energies.kinetic[-1], rtol=2e-3)
 

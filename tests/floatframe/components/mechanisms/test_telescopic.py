@@ -10,8 +10,8 @@ from floatframe import GeneralizedAlpha, integrate
 from floatframe.analyses import mobility
 from floatframe.components.mechanisms import telescopic_slider_crank
 from floatframe.errors import ModelError
+from floatframe.joints import JointCoordinate
 from floatframe.model.functions.time_functions import cycloidal_spin_up
-from floatframe.results.joint_coordinates import joint_coordinate
 from floatframe.results.place_motion import interface_motion
 
 LENGTH, CRANK, RING = 0.4, 0.1, 0.25
@@ -32,14 +32,14 @@ def test_a_stiff_rod_points_at_the_ring():
     system = telescopic_slider_crank(body, list(STATIONS), crank=CRANK, ring=RING, angle=0.3, drive=drive)
     assert mobility(system).mobility == 0  # driven
     motion = integrate(system, GeneralizedAlpha(0.8), 0.4, 1e-3)
-    phi = 0.3 + joint_coordinate(system, motion, "main", "angle").value
+    phi = 0.3 + JointCoordinate("main", "angle").measure(system, motion).value
     pin = CRANK * np.column_stack([np.cos(phi), np.sin(phi), np.zeros(len(phi))])
     way = np.array([RING, 0, 0]) - pin
     reach = np.linalg.norm(way, axis=1)
     tip = interface_motion(motion, "rod", body, "s8").position
     assert np.ptp(reach) > 0.15
     assert_allclose(tip, pin + LENGTH * way / reach[:, None], rtol=0, atol=2e-4 * LENGTH)
-    assert_allclose(joint_coordinate(system, motion, "ring", "distance").value, reach, rtol=0, atol=2e-4 * LENGTH)
+    assert_allclose(motion.joint("ring").distance, reach, rtol=0, atol=2e-4 * LENGTH)
 
 
 def test_work_of_the_drive_is_the_energy_of_the_rod_that_bends():

@@ -12,7 +12,6 @@ from floatframe import GeneralizedAlpha, System, integrate
 from floatframe.errors import ModelError
 from floatframe.integrators import EnergyDecaying, EnergyMomentum, Variational
 from floatframe.joints import CoordinateCoupler, JointCoordinate
-from floatframe.results import joint_coordinate
 from floatframe.simulation import Event
 from tests.floatframe.engine.structure_preserving.systems import (
     CONNECTED,
@@ -81,7 +80,7 @@ def test_motion_converges_with_second_order_to_that_of_generalized_alpha(kind, n
 def test_a_gear_turns_on_beyond_a_full_turn(name):
     """The sum of the angles, counted, stays where it was."""
     motion = integrate(geared(), SCHEMES[name], 3.0, 0.02)
-    angles = [joint_coordinate(geared(), motion, joint, "angle").value for joint in ("joint", "hinge")]
+    angles = [JointCoordinate(joint, "angle").measure(geared(), motion).value for joint in ("joint", "hinge")]
     assert np.ptp(angles[1]) > 4 * np.pi
     held = 3 * angles[0] - angles[1]
     assert_allclose(held, held[0], rtol=0, atol=1e-10)
@@ -106,7 +105,7 @@ def test_a_latch_catches_in_the_midst_of_a_motion(name):
     system = System(pair.bodies, pair.joints, pair.forces, couplers=[latch], events=[caught])
     motion = integrate(system, SCHEMES[name], 0.3, 0.01)
     (event,) = motion.head.summary["events"]
-    angle = joint_coordinate(system, motion, "joint", "angle").value
+    angle = JointCoordinate("joint", "angle").measure(system, motion).value
     assert 0.005 < event["t"] < 0.2
     assert angle[0] < 0.01
     assert_allclose(angle[motion.t > event["t"]], 0.05, rtol=0, atol=1e-9)

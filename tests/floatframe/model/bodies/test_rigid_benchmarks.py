@@ -27,9 +27,9 @@ from floatframe import (
     system_modes,
 )
 from floatframe.components.mechanisms import satellite
+from floatframe.joints import JointCoordinate
 from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_exp
 from floatframe.results.energy_balance import energy_scale
-from floatframe.results.joint_coordinates import joint_coordinate
 from floatframe.results.place_motion import point_motion
 from tests.floatframe.orders import slope
 
@@ -138,7 +138,7 @@ def test_andrews_squeezer_comes_to_the_published_values():
     steps, errors, rate_errors = np.array([2e-5, 1e-5, 5e-6]), [], []
     for h in steps:
         motion = integrate(system, METHOD, 0.03, h)
-        turned = [joint_coordinate(system, motion, name, "angle") for name in joints]
+        turned = [JointCoordinate(name, "angle").measure(system, motion) for name in joints]
         errors.append(np.abs(start + [c.value[-1] for c in turned] - Squeezer.end) / np.abs(Squeezer.end))
         rate_errors.append(np.abs([c.rate[-1] for c in turned] - Squeezer.end_rates) / np.abs(Squeezer.end_rates))
     assert np.max(errors[-1]) < 2e-3
@@ -217,7 +217,7 @@ def test_bricard_mechanism_moves_as_its_energy_in_one_angle_says():
     steps, errors = np.array([4e-3, 2e-3, 1e-3]), []
     for h in steps:
         motion = integrate(system, METHOD, t_end, h)
-        found = joint_coordinate(system, motion, "hinge0", "angle")
+        found = JointCoordinate("hinge0", "angle").measure(system, motion)
         errors.append(np.abs(found.value - exact.sol(motion.t)[0]).max())
     corner = point_motion(motion, "rod2", (0, 0, 1)).position
     assert_allclose(corner, places(exact.sol(motion.t)[0])[:, 3], rtol=0, atol=1e-4)

@@ -7,10 +7,9 @@ from numpy.testing import assert_allclose
 from floatframe import GROUND, GeneralizedAlpha, Marker, PointForce, RevoluteJoint, RigidBody, System, integrate
 from floatframe.analyses import consistent_state
 from floatframe.errors import ModelError
-from floatframe.joints import ConstantVelocityJoint, PointOnLine, UniversalJoint
+from floatframe.joints import ConstantVelocityJoint, JointCoordinate, PointOnLine, UniversalJoint
 from floatframe.model.functions.time_functions import polynomial_of_time
 from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_exp, rotation_log, rotation_matrix
-from floatframe.results.joint_coordinates import joint_coordinate
 
 ANGLE = 0.7  #: between the shafts [rad]
 TILT = np.array([0.3, 0.2, -0.4])  #: of both of them against the ground axes
@@ -72,7 +71,7 @@ def test_the_moment_is_along_the_bisector_and_carries_the_power():
     bisector = (ALONG + BESIDE) / np.linalg.norm(ALONG + BESIDE)
     # the second shaft turns steadily about its axis of symmetry, so that the moment about that axis balances T
     assert_allclose(moment, np.tile(-T / np.cos(ANGLE / 2) * bisector, (len(moment), 1)), rtol=0, atol=1e-6 * T)
-    drive = joint_coordinate(two_shafts(constant_velocity, [brake], spin=SPEED), motion, "drive", "angle")
+    drive = JointCoordinate("drive", "angle").measure(two_shafts(constant_velocity, [brake], spin=SPEED), motion)
     assert_allclose(drive.force, T, rtol=0, atol=1e-6 * T)
 
 

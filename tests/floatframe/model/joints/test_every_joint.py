@@ -25,6 +25,7 @@ from floatframe.errors import ModelError, ResultsError
 from floatframe.joints import (
     CylindricalJoint,
     DistanceJoint,
+    JointCoordinate,
     PlanarJoint,
     PointOnLine,
     PointOnPlane,
@@ -34,7 +35,8 @@ from floatframe.joints import (
 from floatframe.model.functions.time_functions import harmonic, polynomial_of_time
 from floatframe.model.joints.rows import is_held_position
 from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_exp, rotation_matrix
-from floatframe.results.joint_coordinates import joint_coordinate, joint_coordinates
+from floatframe.results.sensors import coordinate_sensors
+from floatframe.sensors import measured
 from tests.floatframe.engine.kernels.examples import C_K, Iterate, newton_matrices
 from tests.floatframe.model.joints.examples import AXIS, CASES, JOINTS, held, pair
 
@@ -216,7 +218,7 @@ def test_a_rod_without_direction_is_refused():
 def test_both_angles_of_a_universal_joint_are_what_its_drives_say():
     system = pair(DRIVEN["universal twice"])
     motion = integrate(system, GeneralizedAlpha(0.8, 1e-11), 0.3, 1e-3)
-    found = joint_coordinates(system, motion)
+    found = measured(system, motion, coordinate_sensors(system))
     assert set(found) == {"j.angle", "j.angle_b"}
     for coordinate in found.values():
         assert_allclose(coordinate.value, [DRIVE(t) for t in motion.t], rtol=0, atol=1e-9)
@@ -235,7 +237,7 @@ def test_screw_driven_by_its_distance_takes_the_force_of_its_turning_inertia():
     for name, motion in (("distance", x), ("angle", polynomial_of_time([0.0, 0.0, 0.2 / slope, 0.3 / slope]))):
         screw = ScrewJoint("j", GROUND, Marker("nut"), axis=(0, 0, 1), lead=lead, motions={name: motion})
         system = System([nut], [screw])
-        found = joint_coordinates(system, integrate(system, GeneralizedAlpha(0.9, 1e-12), 1.0, 1e-3))
+        found = measured(system, integrate(system, GeneralizedAlpha(0.9, 1e-12), 1.0, 1e-3), coordinate_sensors(system))
         along, about = found["j.distance"], found["j.angle"]
         assert_allclose(along.value, [x(t) for t in along.t], rtol=0, atol=1e-9)
         assert_allclose(about.value, along.value / slope, rtol=0, atol=1e-9)
@@ -247,7 +249,7 @@ def test_coordinates_of_driven_joints_are_their_motions_and_forces_those_of_newt
     """Rate and value as prescribed; torque I f'', force m f''; flexible bodies too."""
     system = pair(DRIVEN["cylindrical"])
     motion = integrate(system, GeneralizedAlpha(0.8, 1e-11), 0.3, 1e-3)
-    found = joint_coordinates(system, motion)
+    found = measured(system, motion, coordinate_sensors(system))
     assert set(found) == {"j.distance", "j.angle"}
     for coordinate in found.values():
         assert_allclose(coordinate.value, [DRIVE(t) for t in motion.t], rtol=0, atol=1e-9)
@@ -255,10 +257,10 @@ def test_coordinates_of_driven_joints_are_their_motions_and_forces_those_of_newt
     wheel = RigidBody("wheel", 1.0, np.diag([0.4, 0.4, 0.7]))
     hub = RevoluteJoint("hub", GROUND, Marker("wheel"), axis=(0, 0, 1), motions={"angle": harmonic(0.5, 4.0)})
     one = System([wheel], [hub])
-    turned = joint_coordinate(one, integrate(one, GeneralizedAlpha(0.9, 1e-12), 1.0, 1e-3), "hub", "angle")
+    turned = JointCoordinate("hub", "angle").measure(one, integrate(one, GeneralizedAlpha(0.9, 1e-12), 1.0, 1e-3))
     assert_allclose(turned.force, -0.7 * 16 * turned.value, rtol=0, atol=2e-4)
     with pytest.raises(ResultsError, match="no coordinate 'turn'"):
-        joint_coordinate(one, integrate(one, GeneralizedAlpha(), 0.01, 1e-3), "hub", "turn")
+        JointCoordinate("hub", "turn").measure(one, integrate(one, GeneralizedAlpha(), 0.01, 1e-3))
 
 
 MOVES = {name: make for name, (make, _) in JOINTS.items() if make(Marker("a"), Marker("b")).coordinates}
@@ -269,7 +271,7 @@ MOVES["distance"] = DRIVEN["distance"]  # else it keeps its length
 def test_rates_of_coordinates_between_two_flying_bodies_are_the_slopes_of_their_values(make):
     system = pair(make)
     motion = integrate(system, GeneralizedAlpha(0.9, 1e-11), 0.1, 5e-4)
-    for name, coordinate in joint_coordinates(system, motion).items():
+    for name, coordinate in measured(system, motion, coordinate_sensors(system)).items():
         slope = (coordinate.value[2:] - coordinate.value[:-2]) / (motion.t[2:] - motion.t[:-2])
         assert np.abs(coordinate.rate).max() > 0.05, name
         assert_allclose(slope, coordinate.rate[1:-1], rtol=0, atol=2e-5 * np.abs(coordinate.rate).max(), err_msg=name)

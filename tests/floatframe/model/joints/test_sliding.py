@@ -31,10 +31,9 @@ from floatframe.engine.initial_conditions.newton_equations import displaced, lin
 from floatframe.engine.kernels.work import new_work
 from floatframe.errors import FloatframeError, ModelError
 from floatframe.files.system_file.read_system import read_system
-from floatframe.joints import ConstantOrientation, PointOnLine, SlidingJoint
+from floatframe.joints import ConstantOrientation, JointCoordinate, PointOnLine, SlidingJoint
 from floatframe.model.bodies.mode_choice import frozen_to_rigid
 from floatframe.model.functions.time_functions import polynomial_of_time
-from floatframe.results.joint_coordinates import joint_coordinate
 from floatframe.results.place_motion import interface_motion, point_motion
 from floatframe.results.small_motions.joint_rates import coordinate_rows
 from tests.floatframe.model.joints.examples import held
@@ -249,7 +248,7 @@ def test_coordinate_of_the_joint_is_found_again_in_the_results(is_aligned):
     )
     system = simply_supported(beam(), slide, slider(0.5, 0.2, (0.5, 0, 0)), 9.81)
     motion = integrate(system, GeneralizedAlpha(0.9), 0.25, 2e-4)
-    found = joint_coordinate(system, motion, "slide", "distance")
+    found = JointCoordinate("slide", "distance").measure(system, motion)
     assert_allclose(found.value, [drive(t) for t in found.t], rtol=0, atol=1e-9)
     assert_allclose(found.rate, [drive(t, 1) for t in found.t], rtol=0, atol=1e-5)
     power = found.force * found.rate
@@ -306,7 +305,7 @@ def test_row_of_its_rate_gives_the_rate_of_the_results(geometric):
     u = state.u.copy()
     for i, first in enumerate(compiled.model.bodies.u0[:-1]):
         u[first : first + 3] = work.state.R[i].T @ u[first : first + 3]
-    assert_allclose(row @ u, joint_coordinate(system, motion, "slide", "distance").rate[-1], rtol=1e-9)
+    assert_allclose(row @ u, JointCoordinate("slide", "distance").measure(system, motion).rate[-1], rtol=1e-9)
 
 
 @pytest.mark.parametrize("is_aligned", [False, True])
