@@ -189,7 +189,7 @@ class Registry(UserDict[str, Entry]):
     prefix
         Put before the name of an entry point, such as "." for suffixes.
     made
-        Makes the entry from the loaded object and the name of its package; None: the object itself.
+        Makes the entry from its name, the loaded object and the name of its package; None: the object itself.
     """
 
     def __init__(
@@ -201,7 +201,7 @@ class Registry(UserDict[str, Entry]):
         kind: str = "a function",
         is_kind: Callable[[Any], bool] = callable,
         prefix: str = "",
-        made: Callable[[Any, str], Entry] | None = None,
+        made: Callable[[str, Any, str], Entry] | None = None,
     ) -> None:
         from importlib.metadata import entry_points  # slow, and a door is opened by every import of the packages
 
@@ -239,7 +239,7 @@ class Registry(UserDict[str, Entry]):
             ) from failure
         if not self.is_kind(found):
             raise self.error(f"{where}: {point.value}: expected {self.kind}, got {found!r}")
-        return found if self.made is None else self.made(found, package_of(point))
+        return found if self.made is None else self.made(name, found, package_of(point))
 
 
 def package_of(point: "EntryPoint") -> str:

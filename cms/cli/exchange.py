@@ -2,7 +2,7 @@
 
 import csv
 import json
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,10 +12,13 @@ import typer
 
 from cms.cli.console import output_path, print_table, say, stages
 from cms.errors import ExportError, ForeignBodyError, JobError, ModalFileError, RecoveryError
-from cms.exchange.exporters.formats import FORMATS as EXPORTED
-from cms.exchange.import_body import FORMATS as REDUCED
-from fe_models.files.formats import FORMATS as MODELS
-from fe_models.foundation.formats import FileFormat
+from cms.exchange.export import WRITERS, export_body, unknown_format
+from cms.exchange.import_body import BODY_FORMATS, REDUCED_MATRICES
+from fe_models.files.cad.cad_units import GEOMETRIES
+from fe_models.files.decks.read_deck import DECKS
+from fe_models.files.matrices.read_matrices import MATRIX_FORMATS
+from fe_models.files.read_mesh import MESHES
+from fe_models.foundation.formats import Format
 from fe_models.foundation.units import UNIT_SYSTEMS
 
 if TYPE_CHECKING:
@@ -40,9 +43,10 @@ __all__ = [
 # the command `cms formats`: formats of other programs that are read and written ---------------------------------------
 
 
-#: kinds of file content, in the order from the part to the body
-HELD = ("mesh", "geometry", "deck", "matrices", "reduced body")
-FORMATS = tuple(sorted((*MODELS, *REDUCED, *EXPORTED), key=lambda known: HELD.index(known.holds)))
+#: all formats, from the part to the body
+FORMATS: tuple[Format, ...] = (
+    *MESHES, *GEOMETRIES, *DECKS, *MATRIX_FORMATS, *BODY_FORMATS.values(), *REDUCED_MATRICES, *WRITERS.values(),
+)  # fmt: skip
 IN = ("program", "format", "holds", "what is lost", "tried")
 OUT = ("program", "format", "--to", "what is lost", "tried")
 
@@ -50,7 +54,7 @@ OUT = ("program", "format", "--to", "what is lost", "tried")
 def list_formats(*, as_json: bool, as_markdown: bool) -> None:
     """Print the formats that are read and those that are written, as tables, as JSON, or for docs/formats.md."""
     if as_json:
-        typer.echo(json.dumps([asdict(known) for known in FORMATS], indent=2))
+        typer.echo(json.dumps([known.record() for known in FORMATS], indent=2))
     elif as_markdown:
         typer.echo(markdown_tables())
     else:
@@ -80,7 +84,7 @@ def rows_out() -> list[tuple[str, ...]]:
     return [(f.program, format_words(f), f.key, f.lost, f.tried) for f in FORMATS if f.writes]
 
 
-def format_words(known: FileFormat) -> str:
+def format_words(known: Format) -> str:
     """Return the name of a format with its file suffixes, and the extra that it needs."""
     extra = f"; extra {known.extra}" if known.extra else ""
     return f"{known.name} ({' '.join(known.suffixes)}{extra})"
@@ -109,13 +113,9 @@ def run_export(request: ExportRequest) -> None:
     CmsError
         If the format or the units are unknown or missing, the body does not fit, or the files cannot be written.
     """
-    from cms.exchange.export import WRITERS, export_body, unknown_format
-    from cms.exchange.exporters.formats import FORMATS
-
     if request.to not in WRITERS:
         raise ExportError(f"--to: {unknown_format(request.to)}")
-    suffix = next(known.suffixes[0] for known in FORMATS if known.key == request.to and known.writes)
-    default = request.file.with_name(f"{request.file.stem}_{request.to}{suffix}")
+    default = request.file.with_name(f"{request.file.stem}_{request.to}{WRITERS[request.to].suffixes[0]}")
     path = output_path(request.output, default, ExportError, overwrite_of=(request.file,))
     exported = export_body(
         request.file, path, to=request.to, units=request.units, nodes=request.nodes, loads=loads_of(request)

@@ -10,7 +10,6 @@ from cms.body.invariants import INERTIA_TERMS
 from cms.body.modal_file.file import convert_units, digest, read
 from cms.body.reduced_body import ReducedBody
 from cms.errors import CmsError, ExportError
-from cms.exchange.exporters.formats import FORMATS
 from cms.exchange.exporters.writer import Request, Writer, left_out
 from cms.exchange.programs.ext_ptfm import make_ext_ptfm
 from cms.exchange.programs.exudyn import make_exudyn
@@ -18,7 +17,7 @@ from cms.exchange.programs.matrices import make_abaqus, make_mat5, make_mat73, m
 from cms.exchange.programs.mbdyn import make_mbdyn
 from cms.exchange.programs.mbsim import make_mbsim
 from cms.exchange.programs.nastran import make_dmig, make_op4
-from cms.exchange.programs.sid_fem import DIALECTS, make_sid_fem
+from cms.exchange.programs.sid_fem import make_sid_fem
 from cms.exchange.programs.vtk import make_vtk
 from fe_models.foundation.paths import is_stream, replace_files
 from fe_models.foundation.seal import reason
@@ -27,51 +26,88 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["WRITERS", "Exported", "export_body"]
 
-OVER_INTERFACES = frozenset(
-    {"damping", "rotation", "load cases", "axes in B"}
-)  #: data that all formats with matrices over the interfaces can hold
-WRITERS: dict[str, Writer] = {
-    "mbsim": Writer(
-        make_mbsim,
-        frozenset({"gyroscopic", "damping", "rotation", "stress", "surface", "axes in the mesh"}),
-        needs=("modes",),
+BEYOND_MASS = "inertia beyond the mass matrix, geometric stiffness, stress"
+#: data that all formats with matrices over the interfaces can hold
+OVER_INTERFACES = frozenset({"damping", "rotation", "load cases", "axes in B"})
+SID_FEM = frozenset({"gyroscopic", "geometric", "damping", "rotation", "axes in the mesh"})
+REDUCED = "reduced body"
+FORMATS = (
+    Writer(
+        "ExternalFlexibleFfrBody, HDF5", "MBSim", REDUCED, (".h5",), key="mbsim",
+        tried="h5py; names and orders of its source",
+        lost="geometric stiffness, load cases; rotations beside interfaces",
+        make=make_mbsim, needs=("modes",),
+        content=frozenset({"gyroscopic", "damping", "rotation", "stress", "surface", "axes in the mesh"}),
     ),
-    "exudyn": Writer(
-        make_exudyn,
-        frozenset({"gyroscopic", "damping", "interfaces", "stress", "surface", "axes in B", "axes in the mesh"}),
-        needs=("modes", "nodes"),
+    Writer(
+        "ObjectFFRFreducedOrder, npz and script", "Exudyn", REDUCED, (".npz", ".py"), key="exudyn",
+        tried="exudyn 1.13.6", lost="geometric stiffness, load cases", make=make_exudyn, needs=("modes", "nodes"),
+        content=frozenset(
+            {"gyroscopic", "damping", "interfaces", "stress", "surface", "axes in B", "axes in the mesh"}
+        ),
     ),
-    "mbdyn": Writer(
-        make_mbdyn,
-        frozenset({"gyroscopic", "geometric", "damping", "rotation", "axes in the mesh"}),
-        needs=("modes", "interfaces"),
+    Writer(
+        "modal joint, FEM data", "MBDyn", REDUCED, (".fem",), key="mbdyn",
+        tried="record groups of its source (1.7, develop)", lost="load cases, stress; rotations beside interfaces",
+        make=make_mbdyn, needs=("modes", "interfaces"),
+        content=frozenset({"gyroscopic", "geometric", "damping", "rotation", "axes in the mesh"}),
     ),
-    **{
-        dialect: Writer(
-            partial(make_sid_fem, dialect=dialect),
-            frozenset({"gyroscopic", "geometric", "damping", "rotation", "axes in the mesh"}),
-            needs=("modes", "interfaces"),
-        )
-        for dialect in DIALECTS
-    },
-    "mat": Writer(make_mat5, OVER_INTERFACES | {"interfaces", "surface"}, takes_held=True, needs=("interfaces",)),
-    "mat73": Writer(make_mat73, OVER_INTERFACES | {"interfaces", "surface"}, takes_held=True, needs=("interfaces",)),
-    "matrix-market": Writer(
-        make_matrix_market, OVER_INTERFACES | {"interfaces"}, takes_held=True, needs=("interfaces",)
+    Writer(
+        "SID_FEM, m1(row, q, column)", "PY_SID, EMBSlib", REDUCED, (".SID_FEM",), key="sid_fem",
+        tried="layout of PY_SID's files", lost="second order of J(q), load cases, stress",
+        make=partial(make_sid_fem, dialect="sid_fem"), content=SID_FEM, needs=("modes", "interfaces"),
     ),
-    "simscape": Writer(
-        make_simscape, (OVER_INTERFACES | {"interfaces"}) - {"load cases"}, units="m-kg-s", needs=("interfaces",)
+    Writer(
+        "SID_FEM, m1(row, column, q)", "FEMBeam, welib", REDUCED, (".SID_FEM",), key="sid_fem-fembeam",
+        lost="second order of J(q), load cases, stress",
+        make=partial(make_sid_fem, dialect="sid_fem-fembeam"), content=SID_FEM, needs=("modes", "interfaces"),
     ),
-    "nastran-op4": Writer(make_op4, OVER_INTERFACES, takes_held=True, needs=("interfaces",)),
-    "nastran-dmig": Writer(make_dmig, OVER_INTERFACES, takes_held=True, needs=("interfaces",)),
-    "abaqus": Writer(make_abaqus, OVER_INTERFACES - {"load cases"}, takes_held=True, needs=("interfaces",)),
-    "ext_ptfm": Writer(
-        make_ext_ptfm, OVER_INTERFACES, takes_held=True, takes_loads=True, units="m-kg-s", needs=("interfaces",)
+    Writer(
+        "MAT-file of version 5", "MATLAB, Octave", REDUCED, (".mat",), key="mat", tried="scipy 1.17",
+        lost=BEYOND_MASS, make=make_mat5, content=OVER_INTERFACES | {"interfaces", "surface"}, takes_held=True,
+        needs=("interfaces",),
     ),
-    "vtk": Writer(
-        make_vtk, frozenset({"surface", "stress", "axes in the mesh"}), takes_held=True, needs=("modes", "nodes")
+    Writer(
+        "MAT-file of version 7.3", "MATLAB", REDUCED, (".mat",), key="mat73",
+        tried="h5py, by the attributes of MATLAB", lost=BEYOND_MASS, make=make_mat73,
+        content=OVER_INTERFACES | {"interfaces", "surface"}, takes_held=True, needs=("interfaces",),
     ),
-}  #: writer of each format, by key of `cms.exchange.exporters.formats.FORMATS`
+    Writer(
+        "Reduced Order Flexible Solid (P, K, M, C)", "Simscape Multibody", REDUCED, (".mat",), key="simscape",
+        tried="scipy 1.17", lost=f"{BEYOND_MASS}, load cases", make=make_simscape,
+        content=(OVER_INTERFACES | {"interfaces"}) - {"load cases"}, units="m-kg-s", needs=("interfaces",),
+    ),
+    Writer(
+        "Matrix Market", "many", REDUCED, (".mtx",), key="matrix-market", tried="scipy 1.17", lost=BEYOND_MASS,
+        make=make_matrix_market, content=OVER_INTERFACES | {"interfaces"}, takes_held=True, needs=("interfaces",),
+    ),
+    Writer(
+        "OUTPUT4 with .asm, .pch", "Nastran", REDUCED, (".op4", ".asm", ".pch"), key="nastran-op4",
+        tried="pyYeti 1.4.7, pyNastran 1.4", lost=BEYOND_MASS, make=make_op4, content=OVER_INTERFACES,
+        takes_held=True, needs=("interfaces",),
+    ),
+    Writer(
+        "DMIG", "Nastran", REDUCED, (".pch",), key="nastran-dmig", tried="pyYeti 1.4.7, pyNastran 1.4",
+        lost=f"{BEYOND_MASS}, digits beyond the tenth", make=make_dmig, content=OVER_INTERFACES, takes_held=True,
+        needs=("interfaces",),
+    ),
+    Writer(
+        "linear *USER ELEMENT", "Abaqus", REDUCED, (".inp",), key="abaqus", tried="our own reader",
+        lost=f"{BEYOND_MASS}, load cases", make=make_abaqus, content=OVER_INTERFACES - {"load cases"},
+        takes_held=True, needs=("interfaces",),
+    ),
+    Writer(
+        "ExtPtfm, FlexASCII", "OpenFAST", REDUCED, (".dat",), key="ext_ptfm", tried="its documentation",
+        lost=f"{BEYOND_MASS}, all interfaces but one", make=make_ext_ptfm, content=OVER_INTERFACES, takes_held=True,
+        takes_loads=True, units="m-kg-s", needs=("interfaces",),
+    ),
+    Writer(
+        "VTU, PVD", "ParaView", REDUCED, (".pvd", ".vtu"), key="vtk", tried="pyvista, meshio",
+        lost="all but shapes and stress", make=make_vtk,
+        content=frozenset({"surface", "stress", "axes in the mesh"}), takes_held=True, needs=("modes", "nodes"),
+    ),
+)  # fmt: skip
+WRITERS = {writer.key: writer for writer in FORMATS}  #: writer of each format by its key
 
 NEEDS = {
     "modes": (
@@ -162,7 +198,7 @@ def export_body(
         raise ExportError(f"export: loads: {to} cannot hold constant loads; apply them as forces in the other program")
     converted = convert_units(body, system)
     require_content(converted, to, writer)
-    request = Request(converted, with_suffix(Path(path), to), source, nodes, loads or {})
+    request = Request(converted, with_suffix(Path(path), writer), source, nodes, loads or {})
     made = writer.make(request)
     if is_stream(request.path) and list(made.files) != [request.path]:
         names = ", ".join(file.name for file in made.files)
@@ -173,7 +209,7 @@ def export_body(
         replace_files(made.files)
     except OSError as error:
         raise ExportError(f"{path}: cannot be written: {reason(error)}; nothing was written") from error
-    return Exported(tuple(made.files), left_out(converted, writer.holds), made.notes, system)
+    return Exported(tuple(made.files), left_out(converted, writer.content), made.notes, system)
 
 
 def wanted_units(units: Units | str, to: str, writer: Writer) -> Units:
@@ -186,10 +222,9 @@ def wanted_units(units: Units | str, to: str, writer: Writer) -> Units:
     return system
 
 
-def with_suffix(path: Path, to: str) -> Path:
+def with_suffix(path: Path, writer: Writer) -> Path:
     """Return the path, with the suffix of the format if it has none."""
-    suffix = next(known.suffixes[0] for known in FORMATS if known.key == to)
-    return path if path.suffix or is_stream(path) else path.with_suffix(suffix)
+    return path if path.suffix or is_stream(path) else path.with_suffix(writer.suffixes[0])
 
 
 def require_content(body: ReducedBody, to: str, writer: Writer) -> None:
@@ -204,7 +239,7 @@ def require_content(body: ReducedBody, to: str, writer: Writer) -> None:
         has, words = NEEDS[need]
         if not has(body):
             raise ExportError(f"{where} {words}")
-    if "gyroscopic" in writer.holds:
+    if "gyroscopic" in writer.content:
         try:
             body.moments.require(*INERTIA_TERMS)
         except CmsError as error:

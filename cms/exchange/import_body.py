@@ -27,71 +27,19 @@ from fe_models.files.matrices.read_matrices import read_matrices
 from fe_models.files.read_mesh import read_geometry
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.digest import file_digest
-from fe_models.foundation.formats import FileFormat
-from fe_models.foundation.paths import near_file
+from fe_models.foundation.formats import HEAD, Format
+from fe_models.foundation.paths import bytes_of, reading
 from fe_models.foundation.units import Units, unit_system
-from fe_models.foundation.words import damage, nearest, quoted
+from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["BODY_FORMATS", "FORMATS", "BodyFormat", "ForeignFiles", "import_body"]
+__all__ = ["BODY_FORMATS", "REDUCED_MATRICES", "BodyFormat", "ForeignFiles", "import_body"]
 
 
 # the formats of bodies that another program has reduced ---------------------------------------------------------------
 
 
-FORMATS = (
-    FileFormat(
-        "external superelement (EXTSEOUT)", "Nastran", "reduced body", (".op4", ".pch", ".asm"), reads=True,
-        key="nastran", tried="NX Nastran (sample of pyYeti)",
-        lost="3C, 4C, 5C unless masses are beside; forces of elements of unknown items; structural damping",
-    ),
-    FileFormat(
-        "CMS superelement", "ANSYS", "reduced body", (".sub",), reads=True, key="matrices",
-        tried="example-data of PyMAPDL (cp56.sub)", lost="3C, 4C, 5C unless masses are beside",
-    ),
-    FileFormat(
-        "*SUBSTRUCTURE MATRIX OUTPUT, *USER ELEMENT", "Abaqus, CalculiX", "reduced body", (".mtx",), reads=True,
-        key="matrices", tried="our own matrices in its layout",
-        lost="3C, 4C, 5C unless masses are beside; retained modes; places: a deck beside it",
-    ),
-    FileFormat(
-        "reduced matrices", "any of the matrix formats", "reduced body", (".mtx", ".op4", ".npz", ".mat"), reads=True,
-        key="matrices", tried="our own Craig-Bampton matrices",
-        lost="3C, 4C, 5C unless masses are beside; stress; rows say their dofs, or --boundary does",
-    ),
-    FileFormat(
-        "ExternalFlexibleFfrBody, HDF5", "MBSim", "reduced body", (".h5",), reads=True, key="mbsim",
-        tried="files of our writer; names and orders of its source",
-    ),
-    FileFormat(
-        "ObjectFFRFreducedOrder, npz", "Exudyn", "reduced body", (".npz",), reads=True, key="exudyn",
-        tried="files of our writer, which exudyn 1.13.6 runs", lost="stress (a pickled object, which is never opened)",
-    ),
-    FileFormat(
-        "modal joint, FEM data", "MBDyn", "reduced body", (".fem",), reads=True, key="mbdyn",
-        tried="files of our writer", lost="stress stiffening where an interface is no single node",
-    ),
-    FileFormat(
-        "SID_FEM, m1(row, q, column)", "PY_SID, EMBSlib", "reduced body", (".SID_FEM",), reads=True, key="sid_fem",
-        tried="files of our writer", lost="geometric stiffness without 5C (Gr of first order)",
-    ),
-    FileFormat(
-        "SID_FEM, m1(row, column, q)", "FEMBeam, welib", "reduced body", (".SID_FEM",), reads=True,
-        key="sid_fem-fembeam", tried="files of our writer", lost="geometric stiffness without 5C (Gr of first order)",
-    ),
-    FileFormat(
-        "ExtPtfm, FlexASCII", "OpenFAST", "reduced body", (".dat",), reads=True, key="ext_ptfm",
-        tried="files of our writer", lost="3C, 4C, 5C; loads that change with time; the place of the node",
-    ),
-)  #: one line for each format; `cms formats` and docs/formats.md list them  # fmt: skip
-
-
-# import body ----------------------------------------------------------------------------------------------------------
-
-
-HEAD = 4096  #: number of bytes at the start of a file that identify its format
 Places = Mapping[int, Array]  #: position of each node, by node number
-#: one file, several files, or the file for each role
-ForeignFiles = str | Path | Iterable[str | Path] | Mapping[str, str | Path]
+REDUCED = "reduced body"
 
 
 def never(path: Path, head: bytes) -> bool:
@@ -99,24 +47,76 @@ def never(path: Path, head: bytes) -> bool:
     return False
 
 
-@dataclass(frozen=True)
-class BodyFormat:
+@dataclass(frozen=True, kw_only=True)
+class BodyFormat(Format):
     """Format of reduced bodies: recognition of its files, and its reader."""
 
-    is_it: Callable[[Path, bytes], bool]  #: recognises a file by its path and its first 4096 bytes
+    is_it: Callable[[Path, bytes], bool]  #: recognises a file by its path and its first bytes
     #: reads a body from files, body name, and additional node positions
     read: Callable[[Sequence[Path], str, Places], Superelement | ModalBody]
 
 
-BODY_FORMATS: dict[str, BodyFormat] = {
-    "nastran": BodyFormat(is_nastran, read_nastran),
-    "mbsim": BodyFormat(is_mbsim, read_mbsim),
-    "exudyn": BodyFormat(is_exudyn, read_exudyn),
-    "mbdyn": BodyFormat(is_mbdyn, read_mbdyn),
-    "sid_fem": BodyFormat(is_sid_fem, read_sid_fem),
-    "sid_fem-fembeam": BodyFormat(never, read_sid_fem_fembeam),
-    "ext_ptfm": BodyFormat(is_ext_ptfm, read_ext_ptfm),
-}  #: format by name; the first that recognises a file reads it, unrecognised files are matrices (`read_matrices`)
+#: format by key; the first that recognises a file reads it, unrecognised files are matrices (`read_matrices`)
+BODY_FORMATS = {known.key: known for known in (
+    BodyFormat(
+        "external superelement (EXTSEOUT)", "Nastran", REDUCED, (".op4", ".pch", ".asm"),
+        key="nastran", tried="NX Nastran (sample of pyYeti)",
+        lost="3C, 4C, 5C unless masses are beside; forces of elements of unknown items; structural damping",
+        is_it=is_nastran, read=read_nastran,
+    ),
+    BodyFormat(
+        "ExternalFlexibleFfrBody, HDF5", "MBSim", REDUCED, (".h5",), key="mbsim",
+        tried="files of our writer; names and orders of its source", is_it=is_mbsim, read=read_mbsim,
+    ),
+    BodyFormat(
+        "ObjectFFRFreducedOrder, npz", "Exudyn", REDUCED, (".npz",), key="exudyn",
+        tried="files of our writer, which exudyn 1.13.6 runs", lost="stress (a pickled object, which is never opened)",
+        is_it=is_exudyn, read=read_exudyn,
+    ),
+    BodyFormat(
+        "modal joint, FEM data", "MBDyn", REDUCED, (".fem",), key="mbdyn", tried="files of our writer",
+        lost="stress stiffening where an interface is no single node", is_it=is_mbdyn, read=read_mbdyn,
+    ),
+    BodyFormat(
+        "SID_FEM, m1(row, q, column)", "PY_SID, EMBSlib", REDUCED, (".SID_FEM",), key="sid_fem",
+        tried="files of our writer", lost="geometric stiffness without 5C (Gr of first order)",
+        is_it=is_sid_fem, read=read_sid_fem,
+    ),
+    BodyFormat(
+        "SID_FEM, m1(row, column, q)", "FEMBeam, welib", REDUCED, (".SID_FEM",), key="sid_fem-fembeam",
+        tried="files of our writer", lost="geometric stiffness without 5C (Gr of first order)",
+        is_it=never, read=read_sid_fem_fembeam,
+    ),
+    BodyFormat(
+        "ExtPtfm, FlexASCII", "OpenFAST", REDUCED, (".dat",), key="ext_ptfm", tried="files of our writer",
+        lost="3C, 4C, 5C; loads that change with time; the place of the node",
+        is_it=is_ext_ptfm, read=read_ext_ptfm,
+    ),
+)}  # fmt: skip
+#: formats of matrices whose rows are those of a reduced body
+REDUCED_MATRICES = (
+    Format(
+        "CMS superelement", "ANSYS", REDUCED, (".sub",), key="matrices",
+        tried="example-data of PyMAPDL (cp56.sub)", lost="3C, 4C, 5C unless masses are beside",
+    ),
+    Format(
+        "*SUBSTRUCTURE MATRIX OUTPUT, *USER ELEMENT", "Abaqus, CalculiX", REDUCED, (".mtx",),
+        key="matrices", tried="our own matrices in its layout",
+        lost="3C, 4C, 5C unless masses are beside; retained modes; places: a deck beside it",
+    ),
+    Format(
+        "reduced matrices", "any of the matrix formats", REDUCED, (".mtx", ".op4", ".npz", ".mat"),
+        key="matrices", tried="our own Craig-Bampton matrices",
+        lost="3C, 4C, 5C unless masses are beside; stress; rows say their dofs, or --boundary does",
+    ),
+)  # fmt: skip
+
+
+# import body ----------------------------------------------------------------------------------------------------------
+
+
+#: one file, several files, or the file for each role
+ForeignFiles = str | Path | Iterable[str | Path] | Mapping[str, str | Path]
 
 
 def import_body(
@@ -185,10 +185,11 @@ def import_body(
         return body_of_superelement(of_matrices(files, name or "superelement", places, boundary), options)
     paths = paths_of(files)
     name = name or paths[0].stem
-    key = form or format_of(paths)
+    heads = [bytes_of(str(path), path, ForeignBodyError, n=HEAD) for path in paths]
+    key = form or format_of(paths, heads)
     if key != "matrices" and key not in BODY_FORMATS:
         raise ForeignBodyError(f"format {quoted(key)}: unknown{nearest(key, [*BODY_FORMATS, 'matrices'])}")
-    try:
+    with reading(str(paths[0]), paths[0], key, ForeignBodyError, (CmsError, FeModelsError)):
         if key == "matrices":
             read = read_matrices(files if isinstance(files, Mapping) else paths)
             options = with_names(options, read)
@@ -197,12 +198,6 @@ def import_body(
             if boundary is not None:
                 raise ForeignBodyError(f"boundary: files of {key} list their dofs themselves; remove it")
             body = BODY_FORMATS[key].read(paths, name, places)
-    except (CmsError, FeModelsError):
-        raise
-    except MemoryError as error:
-        raise ForeignBodyError(f"{paths[0]}: not enough memory to read it") from error
-    except Exception as error:  # gives one message for any error of a parser in a damaged file
-        raise ForeignBodyError(f"{paths[0]}: could not be read as {key}: {damage(error)}") from error
     if isinstance(body, Superelement):
         return body_of_superelement(body, options)
     record = {f"file {path}": file_digest(path) for path in paths}
@@ -210,27 +205,17 @@ def import_body(
 
 
 def paths_of(files: ForeignFiles) -> list[Path]:
-    """Return the paths as a list, after checking that the files exist."""
+    """Return the paths as a list."""
     if isinstance(files, Mapping):
         files = list(files.values())
     paths = [Path(files)] if isinstance(files, str | Path) else [Path(path) for path in files]
     if not paths:
         raise ForeignBodyError("import: expected at least one file, got none")
-    for path in paths:
-        if not path.is_file():
-            what = "expected a file, got a folder" if path.is_dir() else f"there is no such file{near_file(path)}"
-            raise ForeignBodyError(f"{path}: {what}")
     return paths
 
 
-def format_of(paths: Sequence[Path]) -> str:
+def format_of(paths: Sequence[Path], heads: Sequence[bytes]) -> str:
     """Return the key of the first format that recognises one of the files; "matrices" if none does."""
-    heads = []
-    for path in paths:
-        with path.open("rb") as file:
-            heads.append(file.read(HEAD))
-        if not heads[-1].strip():
-            raise ForeignBodyError(f"{path}: the file is empty")
     for key, known in BODY_FORMATS.items():
         if any(known.is_it(path, head) for path, head in zip(paths, heads, strict=True)):
             return key

@@ -15,7 +15,7 @@ from fe_models.assembly.tables.attachments import TieSection
 from fe_models.assembly.tables.beams import PLANES, Positive, check_beams
 from fe_models.assembly.tables.materials import MaterialSection, Name
 from fe_models.assembly.tables.shells import check_shells
-from fe_models.files.cad.cad_units import CAD_SUFFIXES
+from fe_models.files.cad.cad_units import CAD_FORMATS
 from fe_models.foundation.parametric_file import read_parametric
 from fe_models.foundation.toml_file import (
     Table,
@@ -30,9 +30,8 @@ from fe_models.foundation.toml_file import (
 from fe_models.foundation.units import UNIT_SYSTEMS
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["DECK_PROGRAMS", "DampingSection", "Job", "ReductionSection", "mode_set_options", "read_job"]
+__all__ = ["DampingSection", "Job", "ReductionSection", "mode_set_options", "read_job"]
 
-DECK_PROGRAMS = ("calculix", "abaqus")  #: programs whose decks have the same suffix
 ACCEPTABLE = (
     "left-out",
     "overlap",
@@ -43,6 +42,13 @@ ACCEPTABLE = (
 )  #: errors of the mesh report that the user may accept
 
 ROLES = ("K", "M", "D", "dofs")  #: roles of matrix files: stiffness, mass, damping, list of rows
+
+
+def deck_programs() -> tuple[str, ...]:
+    """Return the programs whose decks have the same suffix."""
+    from fe_models.files.decks.abaqus.elements import SOLID_RULES
+
+    return tuple(SOLID_RULES)
 
 
 def accepted(value: Any) -> tuple[str, ...]:
@@ -143,7 +149,7 @@ class BodySection(Table):
         description="for a deck: consistent, lumped, or as the deck, of all elements; default: solids by their tables "
         "(as the deck), others consistent",
     )
-    program: choice("program", lambda: DECK_PROGRAMS) | None = Field(  # type: ignore[valid-type]
+    program: choice("program", deck_programs) | None = Field(  # type: ignore[valid-type]
         None,
         description="for a deck (.inp): calculix (default) or abaqus, which determines the elements with lumped mass",
     )
@@ -237,7 +243,7 @@ def check_mesh_size(table: MeshSizeSection | None, mesh: Path | None, *, has_oth
     has_others
         Whether the job has shells or beams.
     """
-    is_cad = mesh is not None and mesh.suffix.lower() in CAD_SUFFIXES
+    is_cad = mesh is not None and mesh.suffix.lower() in CAD_FORMATS
     if is_cad and table is None:
         raise ValueError(
             "mesh_size: missing; a CAD file has to be meshed: expected a table [mesh_size] with size, the largest edge "
@@ -281,7 +287,7 @@ class Job(ModelTables):
     def _fits_together(self) -> "Job":
         if not self.body.matrices and not self.body.deck and not self.materials:
             raise ValueError("materials: missing; a mesh needs at least one table [materials.NAME]")
-        if self.mesh_size is not None or (self.body.mesh and self.body.mesh.suffix.lower() in CAD_SUFFIXES):
+        if self.mesh_size is not None or (self.body.mesh and self.body.mesh.suffix.lower() in CAD_FORMATS):
             check_mesh_size(self.mesh_size, self.body.mesh, has_others=bool(self.shells or self.sections))
         if self.body.deck:
             if self.ties or self.body.part or self.body.incompatible_modes:

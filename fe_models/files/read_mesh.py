@@ -10,14 +10,16 @@ import numpy as np
 from fe_models.door import Registry
 from fe_models.errors import FeModelsError, MeshError
 from fe_models.files.abaqus import read_abaqus
-from fe_models.files.cad.cad_units import CAD_SUFFIXES
+from fe_models.files.cad.cad_units import CAD_FORMATS
 from fe_models.files.gmsh import read_gmsh
 from fe_models.files.med import read_med
 from fe_models.files.nastran import read_nastran
 from fe_models.files.vtk import read_vtk
 from fe_models.foundation.arrays import IntArray
 from fe_models.foundation.digest import file_digest
-from fe_models.foundation.words import damage, nearest, quoted
+from fe_models.foundation.formats import ReadFormat, by_suffix
+from fe_models.foundation.paths import bytes_of, reading
+from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.cells.line_cells import line_mesh_from_raw
 from fe_models.meshes.cells.raw_mesh import LINES, RawMesh, mesh_from_raw, require_nodes
 from fe_models.meshes.cells.shell_cells import shell_mesh_from_raw
@@ -26,7 +28,9 @@ from fe_models.meshes.mesh import FACE_TYPES, SOLID_TYPES, Mesh
 from fe_models.meshes.node_cloud import NodeCloud
 from fe_models.meshes.shell_mesh import ShellMesh
 
-__all__ = ["MESH_FORMATS", "geometry_from_raw", "read_geometry", "read_line_mesh", "read_mesh", "read_shell_mesh"]
+__all__ = [
+    "MESHES", "MESH_FORMATS", "geometry_from_raw", "read_geometry", "read_line_mesh", "read_mesh", "read_shell_mesh",
+]  # fmt: skip
 
 
 # geometry -------------------------------------------------------------------------------------------------------------
@@ -84,20 +88,27 @@ def geometry_from_raw(raw: RawMesh, path: Path, digest: str) -> Mesh | NodeCloud
 
 M = TypeVar("M")
 
-#: format and reader (path, content) by suffix: those of this project, and those of other packages by entry points
-MESH_FORMATS: Registry[tuple[str, Callable[[Path, bytes], RawMesh]]] = Registry("fe_models.readers", {
-    ".msh": ("Gmsh", read_gmsh),
-    ".vtk": ("VTK", read_vtk),
-    ".vtu": ("VTK", read_vtk),
-    ".inp": ("Abaqus", read_abaqus),
-    ".bdf": ("Nastran", read_nastran),
-    ".nas": ("Nastran", read_nastran),
-    ".dat": ("Nastran", read_nastran),
-    ".fem": ("Nastran", read_nastran),
-    ".blk": ("Nastran", read_nastran),
-    ".bulk": ("Nastran", read_nastran),
-    ".med": ("MED", read_med),
-}, MeshError, prefix=".", made=lambda reader, package: (package, reader))  # fmt: skip
+#: reads the content of a file: path and bytes
+MeshReader = Callable[[Path, bytes], RawMesh]
+
+MESHES: tuple[ReadFormat[MeshReader], ...] = (
+    ReadFormat("MSH 2.2, 4.1", "Gmsh", "mesh", (".msh",), tried="Gmsh 4.15", read=read_gmsh),
+    ReadFormat("VTK, VTU", "ParaView", "mesh", (".vtk", ".vtu"), tried="meshio 5.3, pyvista", read=read_vtk),
+    ReadFormat(
+        "input deck", "Abaqus, CalculiX", "mesh", (".inp",), tried="decks of ccx 2.20",
+        lost="all but the mesh and its sets", read=read_abaqus,
+    ),
+    ReadFormat(
+        "bulk data", "Nastran", "mesh", (".bdf", ".nas", ".dat", ".fem", ".blk", ".bulk"), lost="all but the mesh",
+        read=read_nastran,
+    ),
+    ReadFormat("MED", "Salome, code_aster", "mesh", (".med",), read=read_med),
+)  # fmt: skip
+#: format by suffix: those of this project, and those of other packages by entry points
+MESH_FORMATS: Registry[ReadFormat[MeshReader]] = Registry(
+    "fe_models.readers", by_suffix(MESHES), MeshError, prefix=".",
+    made=lambda suffix, reader, package: ReadFormat("mesh", package, "mesh", (suffix,), read=reader),
+)  # fmt: skip
 
 
 def read_mesh(path: str | Path) -> Mesh:
@@ -148,7 +159,7 @@ def read_geometry(path: str | Path) -> Mesh | NodeCloud:
 
     path = Path(path)
     suffix = path.suffix.lower()
-    if suffix in DECK_FORMATS and (suffix not in MESH_FORMATS or MESH_FORMATS[suffix][1] is read_nastran):
+    if suffix in DECK_FORMATS and (suffix not in MESH_FORMATS or MESH_FORMATS[suffix].read is read_nastran):
         return geometry_from_raw(parse_deck(path).mesh, path, file_digest(str(path)))  # coordinate systems, INCLUDE
     return _read(path, geometry_from_raw)
 
@@ -209,35 +220,22 @@ def _read(path: str | Path, convert: Callable[[RawMesh, Path, str], M]) -> M:
     path = Path(path)
     where = f"mesh {path}"
     suffix = path.suffix.lower()
-    if not path.exists():
-        raise MeshError(f"{where}: there is no such file{_neighbours(path)}")
-    if path.is_dir():
-        raise MeshError(f"{where}: expected a file, got a directory")
-    if suffix in CAD_SUFFIXES:
+    if suffix in CAD_FORMATS:
         raise MeshError(
             f"{where}: this is a CAD geometry, which has to be meshed: a table [mesh_size] in a job, or "
             f"fe_models.files.mesh_cad(path, fe_models.files.MeshSize(size), units=...)"
         )
-    if suffix not in MESH_FORMATS:
+    if suffix not in MESH_FORMATS and path.exists() and not path.is_dir():
         raise MeshError(f"{where}: unknown suffix {quoted(suffix)}{nearest(suffix, MESH_FORMATS)}")
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise MeshError(f"{where}: cannot be read: {error.strerror or error}") from error
-    if not data.strip():
-        raise MeshError(f"{where}: the file is empty")
-    name, reader = MESH_FORMATS[suffix]
-    try:
-        return convert(reader(path, data), path, sha256(data).hexdigest())
-    except FeModelsError:
-        raise
-    except (Exception, SystemExit) as error:  # one message for any error that a damaged file causes in a parser
-        raise MeshError(f"{where}: could not be read as a {name} file: {damage(error)}") from error
+    data = bytes_of(where, path, MeshError, hint=_neighbours)
+    known = MESH_FORMATS[suffix]
+    with reading(where, path, known, MeshError, FeModelsError):
+        return convert(known.read(path, data), path, sha256(data).hexdigest())
 
 
 def _neighbours(path: Path) -> str:
     """Name the mesh files in the folder of a missing file."""
     if not path.parent.is_dir():
-        return f"; the directory {path.parent} does not exist"
+        return f"; the folder {path.parent} does not exist"
     files = [p.name for p in path.parent.iterdir() if p.suffix.lower() in MESH_FORMATS]
     return nearest(path.name, files[:20]) if files else ""

@@ -1,19 +1,20 @@
-"""Paths: hints about missing files, and atomic replacement of files, but never of devices and pipes."""
+"""Files: reading with one message for each fault, and atomic replacement, but never of devices and pipes."""
 
 import os
 import re
 import secrets
 import stat
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from glob import escape
 from pathlib import Path
 
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import damage, nearest
 
 __all__ = [
-    "file_identity", "is_stream", "near_file", "remove_parts", "replace_file", "replace_files", "same_file",
-    "sync_folder",
+    "bytes_of", "file_identity", "is_stream", "near_file", "reading", "remove_parts", "replace_file", "replace_files",
+    "same_file", "sync_folder",
 ]  # fmt: skip
 
 OWN_DESCRIPTOR = re.compile(r"/(?:dev|proc/self)/fd/(\d{1,6})")
@@ -26,6 +27,62 @@ def near_file(path: Path) -> str:
         return f"; the folder {path.parent} does not exist"
     hint = nearest(path.name, [p.name for p in path.parent.iterdir()])
     return hint.split("? ")[0] + "?" if "did you mean" in hint else ""
+
+
+def bytes_of(
+    where: str, path: Path, error: type[Exception], *, n: int = -1, hint: Callable[[Path], str] = near_file
+) -> bytes:
+    """Return the bytes of a file; raise `error` if it is missing, a folder, unreadable or empty.
+
+    Parameters
+    ----------
+    where
+        Name of the file, for messages.
+    n
+        Largest number of bytes from the start of the file; -1 for all.
+    hint
+        Returns the end of the message about a missing file.
+    """
+    if not path.exists():
+        raise error(f"{where}: there is no such file{hint(path)}")
+    if path.is_dir():
+        raise error(f"{where}: expected a file, got a folder")
+    try:
+        with path.open("rb") as file:
+            content = file.read(n)
+    except OSError as failure:
+        raise error(f"{where}: cannot be read: {failure.strerror or failure}") from failure
+    if not content.strip():
+        raise error(f"{where}: the file is empty")
+    return content
+
+
+@contextmanager
+def reading(
+    where: str, path: Path, known: object, error: type[Exception], own: type[Exception] | tuple[type[Exception], ...]
+) -> Iterator[None]:
+    """Turn every fault of a reader into one message, whatever a damaged file does to it.
+
+    Parameters
+    ----------
+    where, path
+        Name of the file for messages, and its path.
+    known
+        The format as which the file is read.
+    error
+        Class of the message.
+    own
+        Roots of the errors that already are messages; they pass.
+    """
+    try:
+        yield
+    except own:
+        raise
+    except MemoryError as failure:
+        size = path.stat().st_size
+        raise error(f"{where}: not enough memory to read {size / 1e6:.0f} MB as {known}") from failure
+    except (Exception, SystemExit) as failure:
+        raise error(f"{where}: could not be read as {known}: {damage(failure)}") from failure
 
 
 def own_descriptor(path: Path) -> int | None:

@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 import cms
 import fe_models
 from fe_models.files.read_mesh import MESH_FORMATS
+from fe_models.foundation.formats import ReadFormat
 from tests.bodies import bar
 from tests.root import ROOT
 
@@ -34,7 +35,9 @@ def test_the_mode_set_that_is_shown_is_statically_complete():
 
 
 def test_the_importer_that_is_shown_reads_and_refuses(tmp_path, monkeypatch):
-    monkeypatch.setitem(MESH_FORMATS, ".plain", ("plain text", shown("importer")["read_plain"]))
+    monkeypatch.setitem(
+        MESH_FORMATS, ".plain", ReadFormat("text", "plain", "mesh", (".plain",), read=shown("importer")["read_plain"])
+    )
     file = tmp_path / "one.plain"
     file.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n\nt 0 1 2 3\n")
     mesh = fe_models.read_mesh(file)

@@ -48,7 +48,65 @@ INVARIANTS = ("J0", "C1", "C2", "C3", "C4", "C5")
 
 def content_of(body: ReducedBody, version: int) -> Content:
     """Return the content of the modal file of a body."""
-    datasets = {path: dataset_of(path, values, body.units) for path, values in values_of(body).items()}
+    moments, sums, columns, points = body.moments, body.nodal_sums, body.columns, body.point_stress
+    values: dict[str, Any] = {
+        "/frame/origin": body.frame.origin,
+        "/frame/axes": body.frame.axes,
+        "/frame/dofs": body.frame.dofs,
+        "/modes/M": body.M,
+        "/modes/K": body.K,
+        "/modes/D": body.D,
+        "/modes/frequencies": body.frequencies,
+        "/modes/free_frequencies": body.free_frequencies,
+        "/modes/labels": body.labels,
+        "/modes/sources": body.sources,
+        "/modes/energy_shares": body.energy_shares,
+        "/moments/m": np.array(moments.m),
+        "/nodes/position": body.nodes,
+        "/nodes/id": body.node_ids,
+        "/nodes/Phi": body.Phi,
+        "/surface/triangles": body.surface,
+    }
+    values |= {path: n for path, name in NUMBERS.items() if (n := getattr(body.numbering, name)).size}
+    if body.numbering.instances:
+        values["/instances/names"] = body.numbering.instances
+    values |= {f"/sets/{k}/members": each.members for k, each in enumerate(body.numbering.sets)}
+    if body.kept is not None:
+        values |= {f"/kept/{name}": getattr(body.kept, name) for name in ("nodes", "rotation", "source")}
+    products, invariants = known_terms(moments.missing)
+    values |= {f"/moments/{name}": getattr(moments, name) for name in ("S", "R", "C1", *products)}
+    values |= {f"/invariants/{name}": getattr(moments, name) for name in invariants}
+    for k, interface in enumerate(body.interfaces):
+        of_interface = ("position", "triad", "Psi", "members")
+        values |= {f"/interfaces/{k}/{name}": getattr(interface, name) for name in of_interface}
+    if (geometric := body.geometric) is not None:  # that of interfaces is stored with the interfaces
+        values |= {f"/geometric/{name}": getattr(geometric, name) for name in OF_FRAME}
+        loads = tuple(zip(geometric.loaded, geometric.interfaces, strict=True))
+        values |= {f"/interfaces/{k}/K_geometric": K for k, K in loads}
+        if geometric.turned is not None:
+            values |= {f"{TURNED}/{name}": getattr(geometric.turned, name) for name in OF_FRAME}
+            loads = tuple(zip(geometric.loaded, geometric.turned.interfaces, strict=True))
+            values |= {f"/interfaces/{k}/K_turned": K for k, K in loads}
+        if geometric.spread is not None:
+            names = ("K", "turned", "turned_rigid")
+            values |= {f"{SPREAD}/{name}": getattr(geometric.spread, name) for name in names}
+    if body.quadratic is not None:
+        values["/quadratic/g"] = body.quadratic
+    if columns is not None:
+        values |= {f"/columns/{name}": getattr(columns, name) for name in ("labels", "groups", "A", "F")}
+    if sums is not None:
+        values["/nodal_sums/w"] = np.array(sums.w)
+        values |= {f"/nodal_sums/{name}": getattr(sums, name) for name in ("S", "R", "U1", "U2")}
+    for k, case in enumerate(body.load_cases):
+        values |= {f"/load_cases/{k}/{name}": getattr(case, name) for name in ("force", "torque", "h")}
+    if body.stress is not None:
+        values["/stress/nodal"] = body.stress
+    if points is not None:
+        values["/stress/points/names"], values["/stress/points/position"] = points.names, points.positions
+        values["/stress/points/modes"] = points.modes
+    if body.recovery:
+        values |= recovery_values(body.recovery)
+    datasets = {path: dataset_of(path, array, body.units) for path, array in values.items()}
     return Content(FORMAT, version, datasets, attributes_of(body))
 
 
@@ -98,73 +156,6 @@ def attributes_of(body: ReducedBody) -> dict[str, Mapping[str, Attribute]]:
     if body.nodal_sums is not None:
         attributes["/nodal_sums"] = {"is_volume": int(body.nodal_sums.is_volume)}
     return attributes
-
-
-def values_of(body: ReducedBody) -> dict[str, Any]:
-    """Return the values of all datasets by path."""
-    moments, sums, columns, points = body.moments, body.nodal_sums, body.columns, body.point_stress
-    values: dict[str, Any] = {
-        "/frame/origin": body.frame.origin,
-        "/frame/axes": body.frame.axes,
-        "/frame/dofs": body.frame.dofs,
-        "/modes/M": body.M,
-        "/modes/K": body.K,
-        "/modes/D": body.D,
-        "/modes/frequencies": body.frequencies,
-        "/modes/free_frequencies": body.free_frequencies,
-        "/modes/labels": body.labels,
-        "/modes/sources": body.sources,
-        "/modes/energy_shares": body.energy_shares,
-        "/moments/m": np.array(moments.m),
-        "/nodes/position": body.nodes,
-        "/nodes/id": body.node_ids,
-        "/nodes/Phi": body.Phi,
-        "/surface/triangles": body.surface,
-    }
-    values |= {path: n for path, name in NUMBERS.items() if (n := getattr(body.numbering, name)).size}
-    if body.numbering.instances:
-        values["/instances/names"] = body.numbering.instances
-    values |= {f"/sets/{k}/members": each.members for k, each in enumerate(body.numbering.sets)}
-    if body.kept is not None:
-        values |= {f"/kept/{name}": getattr(body.kept, name) for name in ("nodes", "rotation", "source")}
-    products, invariants = known_terms(moments.missing)
-    values |= {f"/moments/{name}": getattr(moments, name) for name in ("S", "R", "C1", *products)}
-    values |= {f"/invariants/{name}": getattr(moments, name) for name in invariants}
-    for k, interface in enumerate(body.interfaces):
-        names = ("position", "triad", "Psi", "members")
-        values |= {f"/interfaces/{k}/{name}": getattr(interface, name) for name in names}
-    if body.geometric is not None:
-        values |= geometric_values(body.geometric)
-    if body.quadratic is not None:
-        values["/quadratic/g"] = body.quadratic
-    if columns is not None:
-        values |= {f"/columns/{name}": getattr(columns, name) for name in ("labels", "groups", "A", "F")}
-    if sums is not None:
-        values["/nodal_sums/w"] = np.array(sums.w)
-        values |= {f"/nodal_sums/{name}": getattr(sums, name) for name in ("S", "R", "U1", "U2")}
-    for k, case in enumerate(body.load_cases):
-        values |= {f"/load_cases/{k}/{name}": getattr(case, name) for name in ("force", "torque", "h")}
-    if body.stress is not None:
-        values["/stress/nodal"] = body.stress
-    if points is not None:
-        values["/stress/points/names"], values["/stress/points/position"] = points.names, points.positions
-        values["/stress/points/modes"] = points.modes
-    if body.recovery:
-        values |= recovery_values(body.recovery)
-    return values
-
-
-def geometric_values(geometric: GeometricStiffness) -> dict[str, Any]:
-    """Return the values of the geometric stiffness by path; those of interfaces are stored with the interfaces."""
-    values: dict[str, Any] = {f"/geometric/{name}": getattr(geometric, name) for name in OF_FRAME}
-    values |= {f"/interfaces/{k}/K_geometric": K for k, K in zip(geometric.loaded, geometric.interfaces, strict=True)}
-    if geometric.turned is not None:
-        values |= {f"{TURNED}/{name}": getattr(geometric.turned, name) for name in OF_FRAME}
-        of_interfaces = zip(geometric.loaded, geometric.turned.interfaces, strict=True)
-        values |= {f"/interfaces/{k}/K_turned": K for k, K in of_interfaces}
-    if geometric.spread is not None:
-        values |= {f"{SPREAD}/{name}": getattr(geometric.spread, name) for name in ("K", "turned", "turned_rigid")}
-    return values
 
 
 def known_terms(missing: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:

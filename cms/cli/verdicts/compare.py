@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from cms.cli.console import print_table, say, stages
 from cms.errors import CompareError
+from fe_models.foundation.formats import by_suffix
 from fe_models.foundation.words import nearest, quoted
 
 if TYPE_CHECKING:
@@ -87,13 +88,17 @@ def run_compare(request: CompareRequest) -> None:
 
 
 def require_job(path: Path) -> None:
-    """Raise `CompareError` for a modal file or bare matrices; the message says what is needed."""
+    """Raise `CompareError` for a modal file or the file of a model; the message says what is needed."""
+    if path.suffix.lower() == ".toml":
+        return
+    from cms.cli.exchange import FORMATS
+
     if path.suffix.lower() in (".h5", ".hdf5"):
         raise CompareError(
             f"{path}: a modal file holds no full model to compare with; give the job (.toml) it was made from, or "
             f"judge the file alone: cms check {path}"
         )
-    if path.suffix.lower() in (".npz", ".msh", ".inp", ".bdf", ".vtu"):
+    if path.suffix.lower() in by_suffix(known for known in FORMATS if known.holds != "matrices"):
         raise CompareError(
             f"{path}: expected a job file (.toml) that names this file, its interfaces and units; see docs/job_file.md"
         )

@@ -10,6 +10,7 @@ import numpy as np
 
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.formats import Format
 
 __all__ = ["CONTENT", "Request", "Writer", "WrittenFiles", "in_ascii", "left_out"]
 
@@ -80,21 +81,23 @@ class WrittenFiles:
     notes: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class Writer:
-    """Writer of one format: its function, and the data that the format can hold."""
+@dataclass(frozen=True, kw_only=True)
+class Writer(Format):
+    """Format in which a reduced body is written: its function, and the data that it can hold."""
 
+    reads: bool = False
+    writes: bool = True
     make: Callable[[Request], WrittenFiles]
-    holds: frozenset[str] = field(default_factory=frozenset)  #: keys of `CONTENT` that the format can hold
+    content: frozenset[str]  #: keys of `CONTENT` that the format can hold
     takes_held: bool = False  #: whether the format can describe a body that is fixed to the ground
     takes_loads: bool = False  #: whether the file can hold constant loads
     units: str = ""  #: the only unit system that the program accepts; empty: all systems
     needs: tuple[str, ...] = ()  #: data that a body must have: "nodes", "interfaces"
 
 
-def left_out(body: ReducedBody, holds: Iterable[str]) -> tuple[str, ...]:
+def left_out(body: ReducedBody, content: Iterable[str]) -> tuple[str, ...]:
     """Describe the data of a body that a format cannot hold, given the content that it can hold."""
-    held = set(holds)
+    held = set(content)
     return tuple(words for key, (words, has) in CONTENT.items() if key not in held and has(body))
 
 

@@ -11,7 +11,7 @@ from cms.exchange.exporters.writer import Request, WrittenFiles
 from cms.exchange.importers.element_rows import ForeignRows, force_rows, motion_rows, stress_rows
 from cms.exchange.importers.superelement import RecoveryRows, Superelement
 from cms.reduction.interface_model import InterfaceModel, interface_model
-from fe_models.files.nastran_matrices.superelement import SCALAR, NastranSuperelement, read_superelement
+from fe_models.files.nastran_matrices.superelement import SCALAR, TEXTS, NastranSuperelement, read_superelement
 from fe_models.files.nastran_matrices.write_op4 import op4_parts
 from fe_models.foundation.arrays import Array, IntArray
 
@@ -226,17 +226,14 @@ def real(value: float, letter: str = "E") -> str:
 # external superelements of Nastran: the record of their files as a superelement of ours -------------------------------
 
 
-COMPANIONS = (".pch", ".asm")  #: suffixes of the text files of an external superelement with the same name as its .op4
-
-
 def is_nastran(path: Path, head: bytes) -> bool:
     """Return whether a file belongs to an external superelement: by its cards, or by cards in the same folder."""
     suffix = path.suffix.lower()
-    if suffix in COMPANIONS:
+    if suffix in TEXTS:
         return any(word in head.upper() for word in (b"EXT. SUPERELEMENT", b"EXTRN", b"SEBULK", b"BEGIN SUPER"))
     if suffix != ".op4":
         return False
-    beside = [path.with_suffix(other) for other in (*COMPANIONS, *(text.upper() for text in COMPANIONS))]
+    beside = [path.with_suffix(other) for other in (*TEXTS, *(text.upper() for text in TEXTS))]
     return any(other.is_file() for other in beside)
 
 

@@ -11,11 +11,11 @@ import numpy as np
 
 from fe_models.errors import MeshError
 from fe_models.files.cad.cad_faces import CadFace, cad_faces
-from fe_models.files.cad.cad_units import CAD_SUFFIXES, length_unit
+from fe_models.files.cad.cad_units import CAD_FORMATS, length_unit
 from fe_models.files.cad.gmsh_model import gmsh_call, gmsh_model
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ArgumentError
-from fe_models.foundation.paths import near_file
+from fe_models.foundation.paths import bytes_of
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from fe_models.foundation.units import Units, unit_system
@@ -132,7 +132,7 @@ def open_cad(path: str | Path, *, units: Units | str) -> Iterator[CadModel]:
     path = Path(path)
     units = unit_system(units) if isinstance(units, str) else units
     content = _content(path)
-    kind = CAD_SUFFIXES[path.suffix.lower()]
+    kind = CAD_FORMATS[path.suffix.lower()].name
     unit = length_unit(path, content)
     model_unit = unit[1] if unit is not None and kind == "IGES" and unit[1] in KERNEL_UNITS else MILLIMETRE
     scale = 1.0 if unit is None else units.length / model_unit
@@ -162,17 +162,9 @@ def open_cad(path: str | Path, *, units: Units | str) -> Iterator[CadModel]:
 
 def _content(path: Path) -> bytes:
     where = f"geometry {path}"
-    if path.suffix.lower() not in CAD_SUFFIXES:
-        raise MeshError(f"{where}: unknown suffix {quoted(path.suffix)}{nearest(path.suffix, CAD_SUFFIXES)}")
-    if not path.is_file():
-        raise MeshError(f"{where}: there is no such file{near_file(path)}")
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise MeshError(f"{where}: cannot be read: {error.strerror or error}") from error
-    if not content.strip():
-        raise MeshError(f"{where}: the file is empty")
-    return content
+    if path.suffix.lower() not in CAD_FORMATS:
+        raise MeshError(f"{where}: unknown suffix {quoted(path.suffix)}{nearest(path.suffix, CAD_FORMATS)}")
+    return bytes_of(where, path, MeshError)
 
 
 def _volume(gmsh: ModuleType) -> float:

@@ -9,11 +9,26 @@ import re
 from pathlib import Path
 
 from fe_models.errors import MeshError
+from fe_models.foundation.formats import Format, by_suffix
 
-__all__ = ["CAD_SUFFIXES", "length_unit"]
+__all__ = ["CAD_FORMATS", "GEOMETRIES", "length_unit"]
 
-#: format of each suffix
-CAD_SUFFIXES = {".step": "STEP", ".stp": "STEP", ".iges": "IGES", ".igs": "IGES", ".brep": "BREP"}
+_TRIED = "Gmsh 4.15, OpenCASCADE 7.8"
+GEOMETRIES = (
+    Format(
+        "STEP", "CAD programs", "geometry", (".step", ".stp"), tried=_TRIED,
+        lost="names of faces, assemblies' structure", extra="mesh",
+    ),
+    Format(
+        "IGES", "CAD programs", "geometry", (".iges", ".igs"), tried=_TRIED, lost="names, bodies with cavities",
+        extra="mesh",
+    ),
+    Format(
+        "BREP", "OpenCASCADE, FreeCAD", "geometry", (".brep",), tried=_TRIED, lost="it has no unit, names, colours",
+        extra="mesh",
+    ),
+)  # fmt: skip
+CAD_FORMATS = by_suffix(GEOMETRIES)  #: format of each suffix
 
 PREFIXES = {
     "$": 1.0, ".MILLI.": 1e-3, ".CENTI.": 1e-2, ".DECI.": 1e-1, ".MICRO.": 1e-6, ".NANO.": 1e-9, ".KILO.": 1e3,
@@ -39,7 +54,7 @@ def length_unit(path: Path, content: bytes) -> tuple[str, float] | None:
     MeshError
         If a STEP or IGES file states no length unit, an unknown one, or several.
     """
-    kind = CAD_SUFFIXES[path.suffix.lower()]
+    kind = CAD_FORMATS[path.suffix.lower()].name
     if kind == "BREP":
         return None
     metres = _step_units(path, content) if kind == "STEP" else {_iges_unit(path, content)}

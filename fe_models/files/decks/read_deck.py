@@ -8,24 +8,37 @@ from fe_models.files.decks.abaqus.whole_deck import read_abaqus_deck
 from fe_models.files.decks.ansys.cdb import read_cdb_deck
 from fe_models.files.decks.deck import Deck
 from fe_models.files.decks.nastran.whole_deck import read_nastran_deck
-from fe_models.foundation.paths import near_file
-from fe_models.foundation.words import damage, nearest, quoted
+from fe_models.foundation.formats import ReadFormat, by_suffix
+from fe_models.foundation.paths import bytes_of, reading
+from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.cells.raw_mesh import require_nodes
 
-__all__ = ["DECK_FORMATS", "parse_deck"]
+__all__ = ["DECKS", "DECK_FORMATS", "parse_deck"]
 
-DECK_FORMATS: dict[str, Callable[..., Deck]] = {
-    ".inp": read_abaqus_deck,
-    ".cdb": read_cdb_deck,
-    ".bdf": read_nastran_deck,
-    ".nas": read_nastran_deck,
-    ".dat": read_nastran_deck,
-    ".fem": read_nastran_deck,
-    ".blk": read_nastran_deck,
-    ".bulk": read_nastran_deck,
-    ".asm": read_nastran_deck,
-    ".pch": read_nastran_deck,
-}  #: reader (path, content, program) for each suffix
+#: reads the content of a file: path, bytes, and the program if several have the same suffix
+DeckReader = Callable[..., Deck]
+
+DECKS: tuple[ReadFormat[DeckReader], ...] = (
+    ReadFormat(
+        "bulk data", "Nastran", "deck", (".bdf", ".nas", ".dat", ".fem", ".blk", ".bulk", ".asm", ".pch"),
+        tried="decks of MSC Nastran 2020",
+        lost="smeared layers, RBE1, scalar points that grid points move, contact, external superelements, fluids: each "
+        "listed with its count",
+        read=read_nastran_deck,
+    ),
+    ReadFormat(
+        "CDB", "ANSYS", "deck", (".cdb",), tried="ANSYS 2019 R2",
+        lost="all but SOLID185, 186, 187, SHELL181, 281, materials, components, supports, forces: each listed with "
+        "its count",
+        read=read_cdb_deck,
+    ),
+    ReadFormat(
+        "input deck", "Abaqus, CalculiX", "deck", (".inp",), tried="decks of ccx 2.20",
+        lost="contact, nonlinear materials, steps: each listed with its count",
+        read=read_abaqus_deck,
+    ),
+)  # fmt: skip
+DECK_FORMATS = by_suffix(DECKS)  #: format of each suffix
 
 
 def parse_deck(path: str | Path, *, program: str | None = None) -> Deck:
@@ -48,22 +61,15 @@ def parse_deck(path: str | Path, *, program: str | None = None) -> Deck:
     suffix = path.suffix.lower()
     if suffix not in DECK_FORMATS:
         raise MeshError(f"{where}: unknown suffix {quoted(suffix)}{nearest(suffix, DECK_FORMATS)}")
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise MeshError(f"{where}: cannot be read: {error.strerror or error}{near_file(path)}") from error
-    reader = DECK_FORMATS[suffix]
-    if program is not None and reader is not read_abaqus_deck:
+    data = bytes_of(where, path, MeshError)
+    known = DECK_FORMATS[suffix]
+    if program is not None and known.read is not read_abaqus_deck:
         raise MeshError(f"{where}: program = {program!r} belongs to decks of Abaqus and CalculiX (.inp); leave it out")
-    try:
-        deck = reader(path, data) if program is None else reader(path, data, program=program)
+    with reading(where, path, known, MeshError, FeModelsError):
+        deck = known.read(path, data) if program is None else known.read(path, data, program=program)
         require_nodes(where, deck.mesh)
         _note_means_of_followers(deck)
         return deck
-    except FeModelsError:
-        raise
-    except Exception as error:  # whatever a damaged file does to a reader, the user gets one message
-        raise MeshError(f"{where}: could not be read: {damage(error)}") from error
 
 
 def _note_means_of_followers(deck: Deck) -> None:

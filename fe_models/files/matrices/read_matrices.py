@@ -1,9 +1,8 @@
 """Reading of matrix files: formats by suffix and content, several files of one model, one kind of error."""
 
 import io
-import os
 import zipfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -27,7 +26,7 @@ from fe_models.files.matrices.matlab import (
     real_matrix,
 )
 from fe_models.files.matrices.nastran import read_op2_part, read_op4_part, read_punch_part
-from fe_models.files.matrices.request import MatrixFormat, Request
+from fe_models.files.matrices.request import Request
 from fe_models.files.matrices.text_files.abaqus import (
     calculix_neighbours,
     is_labelled,
@@ -43,8 +42,9 @@ from fe_models.files.matrices.triangles import mirrored
 from fe_models.files.nastran_matrices.op2 import is_op2
 from fe_models.files.nastran_matrices.op4 import is_op4
 from fe_models.foundation.digest import file_digest
-from fe_models.foundation.paths import near_file
-from fe_models.foundation.words import damage, nearest, quoted
+from fe_models.foundation.formats import HEAD, ReadFormat, format_of
+from fe_models.foundation.paths import bytes_of, reading
+from fe_models.foundation.words import nearest, quoted
 
 __all__ = [
     "MATRIX_FORMATS",
@@ -201,25 +201,70 @@ def read_harwell_boeing(path: Path, request: Request) -> ForeignMatrices:
 # read matrices --------------------------------------------------------------------------------------------------------
 
 
-HEAD = 4096  #: number of first bytes that identify the format of a file
+#: reads a part of a model from a file, as requested
+MatrixReader = Callable[[Path, Request], ForeignMatrices]
 
-MATRIX_FORMATS: tuple[MatrixFormat, ...] = (
-    MatrixFormat("Nastran OP4", (".op4",), read_op4_part, is_op4),
-    MatrixFormat("Nastran OP2", (".op2",), read_op2_part, is_op2),
-    MatrixFormat("Nastran punch", (".pch", ".asm"), read_punch_part),
-    MatrixFormat("Matrix Market", (".mtx", ".mm", ".mmf", ".txt"), read_matrix_market, is_matrix_market),
-    MatrixFormat("Abaqus matrix (MATRIX INPUT)", (".mtx",), read_labelled, is_labelled),
-    MatrixFormat("substructure text", (".mtx",), read_user_element, is_user_element),
-    MatrixFormat("CalculiX matrix", (".sti", ".mas"), read_calculix_matrix, is_coordinates),
-    MatrixFormat("CalculiX list of dofs", (".dof",), read_calculix_dofs),
-    MatrixFormat("MATLAB 7.3", (".mat",), read_matlab_7, is_matlab_7),
-    MatrixFormat("MATLAB", (".mat",), read_matlab_5, is_matlab_5),
-    MatrixFormat("SciPy or NumPy archive", (".npz",), read_npz),
-    MatrixFormat("Harwell-Boeing", (".hb", ".rb", ".rsa", ".rua", ".matrix"), read_harwell_boeing, is_harwell_boeing),
-    MatrixFormat("ANSYS full", (".full",), read_full_part, is_ansys_binary),
-    MatrixFormat("ANSYS superelement", (".sub",), read_sub_part, is_ansys_binary),
-    MatrixFormat("Abaqus matrix (COORDINATE)", (".mtx",), read_coordinates, is_coordinates),
-)  #: supported formats; if several have the same suffix, the first that recognises the content is used
+#: if several formats have the same suffix, the first that recognises the content is used
+MATRIX_FORMATS: tuple[ReadFormat[MatrixReader], ...] = (
+    ReadFormat(
+        "OUTPUT4", "Nastran", "matrices", (".op4",), tried="NX 9.1, Simcenter of 2020, MSC 2017",
+        lost="structural damping (K4) of external superelements", read=read_op4_part, is_it=is_op4,
+    ),
+    ReadFormat(
+        "OUTPUT2, matrix data blocks", "Nastran", "matrices", (".op2",), tried="NX 9.1", extra="nastran",
+        lost="tables", read=read_op2_part, is_it=is_op2,
+    ),
+    ReadFormat(
+        "DMIG, EXTRN", "Nastran", "matrices", (".pch", ".asm"), tried="NX 9.1, Simcenter of 2020, MSC 2017",
+        read=read_punch_part,
+    ),
+    ReadFormat(
+        ".full", "ANSYS", "matrices", (".full",), tried="2017 to 2019 (100033)",
+        lost="positions: a deck beside it; lumped masses and constraint equations are refused",
+        read=read_full_part, is_it=is_ansys_binary,
+    ),
+    ReadFormat(
+        ".sub, superelement", "ANSYS", "matrices", (".sub",), tried="2019 to 2020 (121656)",
+        read=read_sub_part, is_it=is_ansys_binary,
+    ),
+    ReadFormat(
+        "Matrix Market, with nodes of its rows", "Ansys, SciPy", "matrices", (".mtx", ".mm", ".mmf", ".txt"),
+        tried="SciPy 1.17", read=read_matrix_market, is_it=is_matrix_market,
+    ),
+    ReadFormat(
+        "*MATRIX GENERATE, MATRIX INPUT", "Abaqus", "matrices", (".mtx",), tried="by its layout",
+        read=read_labelled, is_it=is_labelled,
+    ),
+    ReadFormat(
+        "*SUBSTRUCTURE MATRIX OUTPUT", "Abaqus, CalculiX", "matrices", (".mtx",), tried="CalculiX 2.20",
+        lost="modes that are retained", read=read_user_element, is_it=is_user_element,
+    ),
+    ReadFormat(
+        "*MATRIX GENERATE, COORDINATE", "Abaqus", "matrices", (".mtx",), tried="Abaqus 2021",
+        lost="the numbers of nodes: a deck beside it", read=read_coordinates, is_it=is_coordinates,
+    ),
+    ReadFormat(
+        "MATRIXSTORAGE", "CalculiX", "matrices", (".sti", ".mas"), tried="CalculiX 2.20",
+        read=read_calculix_matrix, is_it=is_coordinates,
+    ),
+    ReadFormat(
+        "MATRIXSTORAGE, list of dofs", "CalculiX", "matrices", (".dof",), tried="CalculiX 2.20",
+        read=read_calculix_dofs,
+    ),
+    ReadFormat(
+        "MAT 7.3", "MATLAB", "matrices", (".mat",), tried="h5py 3", read=read_matlab_7, is_it=is_matlab_7
+    ),
+    ReadFormat(
+        "MAT 5", "MATLAB, Octave", "matrices", (".mat",), tried="SciPy 1.17", read=read_matlab_5, is_it=is_matlab_5
+    ),
+    ReadFormat(
+        "sparse and dense npz", "SciPy, NumPy", "matrices", (".npz",), tried="SciPy 1.17", read=read_npz
+    ),
+    ReadFormat(
+        "Harwell-Boeing RSA, RUA", "Ansys", "matrices", (".hb", ".rb", ".rsa", ".rua", ".matrix"),
+        tried="by its layout", read=read_harwell_boeing, is_it=is_harwell_boeing,
+    ),
+)  # fmt: skip
 
 #: one file, several files, or the file of each role
 MatrixFiles = str | Path | Iterable[str | Path] | Mapping[str, str | Path]
@@ -272,42 +317,9 @@ def read_matrices(files: MatrixFiles, *, names: Mapping[str, str] | None = None)
 def read_part(path: Path, request: Request) -> ForeignMatrices:
     """Read the content of one file; every fault becomes one message."""
     where = f"matrices {path}"
-    if not path.exists():
-        raise MatrixError(f"{where}: there is no such file{near_file(path)}")
-    if path.is_dir():
-        raise MatrixError(f"{where}: expected a file, got a directory")
-    try:
-        with path.open("rb") as file:
-            head = file.read(HEAD)
-    except OSError as error:
-        raise MatrixError(f"{where}: cannot be read: {error.strerror or error}") from error
-    if not head.strip():
-        raise MatrixError(f"{where}: the file is empty")
-    form = format_of(where, path, head)
-    try:
-        with ThreadPoolExecutor(1) as beside:  # the digest uses another core
-            digest = beside.submit(file_digest, path)
-            part = form.read(path, request)
-    except FeModelsError:
-        raise
-    except MemoryError as error:
-        size = os.path.getsize(path)
-        raise MatrixError(f"{where}: not enough memory to read {size / 1e6:.0f} MB as {form.name}") from error
-    except (Exception, SystemExit) as error:  # one message for any error that a damaged file causes in a parser
-        raise MatrixError(f"{where}: could not be read as {form.name}: {damage(error)}") from error
-    return replace(part, files={**part.files, str(path): digest.result()})
-
-
-def format_of(where: str, path: Path, head: bytes) -> MatrixFormat:
-    """Return the format of a file by its suffix, and by its content if several formats have this suffix."""
-    suffix = path.suffix.lower()
-    mine = [form for form in MATRIX_FORMATS if suffix in form.suffixes]
-    if not mine:
-        known = sorted({suffix for form in MATRIX_FORMATS for suffix in form.suffixes})
-        raise MatrixError(f"{where}: unknown suffix {quoted(suffix)}{nearest(suffix, known)}")
-    for form in mine:
-        if form.is_it(head):
-            return form
-    raise MatrixError(
-        f"{where}: expected {' or '.join(form.name for form in mine)}, got a file that begins with {quoted(head[:30])}"
-    )
+    head = bytes_of(where, path, MatrixError, n=HEAD)
+    known = format_of(where, path, head, MATRIX_FORMATS, MatrixError)
+    with reading(where, path, known, MatrixError, FeModelsError), ThreadPoolExecutor(1) as beside:
+        digest = beside.submit(file_digest, path)  # on another core
+        part = known.read(path, request)
+        return replace(part, files={**part.files, str(path): digest.result()})

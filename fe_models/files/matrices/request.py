@@ -1,14 +1,13 @@
-"""Request to a reader of matrices, and the description of a reader."""
+"""Request to a reader of matrices."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from fe_models.errors import MatrixError
-from fe_models.files.matrices.foreign_matrices import ROLES, ForeignMatrices
+from fe_models.files.matrices.foreign_matrices import ROLES
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["MatrixFormat", "Request", "anything"]
+__all__ = ["Request"]
 
 
 @dataclass(frozen=True)
@@ -70,20 +69,3 @@ class Request:
                 'names = {K = "...", M = "..."}'
             )
         return found
-
-
-def anything(head: bytes) -> bool:
-    """Return True, for formats whose suffix identifies them."""
-    return True
-
-
-@dataclass(frozen=True)
-class MatrixFormat:
-    """Format of matrix files, and its reader."""
-
-    name: str  #: name for messages, such as "Abaqus matrix"
-    suffixes: tuple[str, ...]  #: suffixes in lower case
-    read: Callable[[Path, Request], ForeignMatrices]  #: function that reads the content of a file
-    is_it: Callable[[bytes], bool] = (
-        anything  #: test of the first `HEAD` bytes; the first format with the suffix that returns True is used
-    )

@@ -20,9 +20,9 @@ from fe_models.files.nastran_matrices.op4 import is_op4, read_op4
 from fe_models.files.nastran_matrices.raw_matrix import NastranMatrix, dense_matrix, matrix_named, real_square
 from fe_models.foundation.arrays import Array, IntArray
 
-__all__ = ["SCALAR", "ElementRows", "NastranSuperelement", "Recovery", "extrn_rows", "read_superelement"]
+__all__ = ["SCALAR", "TEXTS", "ElementRows", "NastranSuperelement", "Recovery", "extrn_rows", "read_superelement"]
 
-COMPANIONS = (".op4", ".pch", ".asm")  #: suffixes of files that are read together
+TEXTS = (".pch", ".asm")  #: suffixes of the text files with the same name as the .op4 file
 STIFFNESS, MASS, DAMPING = ("KXX", "KAA"), ("MXX", "MAA"), ("BXX", "BXX1", "BAA")
 LOADS, OTHER_DAMPING = ("PX", "PX1", "PA", "PAA"), ("K4XX", "K4XX1", "K4AA")
 
@@ -97,7 +97,7 @@ def read_superelement(files: str | Path | Iterable[str | Path]) -> NastranSupere
     """
     paths = [Path(files)] if isinstance(files, (str, Path)) else [Path(path) for path in files]
     notes = []
-    if len(paths) == 1 and paths[0].suffix.lower() in COMPANIONS:
+    if len(paths) == 1 and paths[0].suffix.lower() in (".op4", *TEXTS):
         beside = [path for path in _companions(paths[0]) if path.is_file()]
         paths = [path for path in beside if path.suffix != paths[0].suffix] + paths
         notes.append(f"read together: {', '.join(sorted(path.name for path in paths))}")
@@ -152,7 +152,7 @@ def read_superelement(files: str | Path | Iterable[str | Path]) -> NastranSupere
 
 def _companions(path: Path) -> list[Path]:
     """Return the paths of the files that belong together, with suffixes in the same letter case."""
-    return [path.with_suffix(suffix.upper() if path.suffix.isupper() else suffix) for suffix in COMPANIONS]
+    return [path.with_suffix(suffix.upper() if path.suffix.isupper() else suffix) for suffix in (".op4", *TEXTS)]
 
 
 def _contents(where: str, paths: list[Path]) -> tuple[list[NastranMatrix], list[Card], dict[str, str]]:

@@ -98,13 +98,13 @@ def test_missing_file_names_its_neighbours(tmp_path):
     (tmp_path / "rod.msh").write_text("")
     with pytest.raises(MeshError, match=r"there is no such file; did you mean 'rod.msh'\?"):
         read_mesh(tmp_path / "rud.msh")
-    with pytest.raises(MeshError, match=r"the directory .*nowhere does not exist"):
+    with pytest.raises(MeshError, match=r"the folder .*nowhere does not exist"):
         read_mesh(tmp_path / "nowhere" / "rod.msh")
 
 
 def test_directory_is_refused(tmp_path):
     (tmp_path / "rod.msh").mkdir()
-    with pytest.raises(MeshError, match="expected a file, got a directory"):
+    with pytest.raises(MeshError, match="expected a file, got a folder"):
         read_mesh(tmp_path / "rod.msh")
 
 
@@ -120,10 +120,10 @@ def test_unreadable_file_is_refused(tmp_path, monkeypatch):
     path = tmp_path / "rod.msh"
     path.write_text(MSH22)
 
-    def deny(self):
+    def deny(self, *_):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("pathlib.Path.read_bytes", deny)
+    monkeypatch.setattr("pathlib.Path.open", deny)
     with pytest.raises(MeshError, match="cannot be read: Permission denied"):
         read_mesh(path)
 
@@ -355,7 +355,7 @@ def test_groups_of_one_name_and_two_dimensions_and_cells_without_a_group(tmp_pat
         ("1 4 2 1 1 1 2 3 4", "1 44 2 1 1 1 2 3 4", "Gmsh type 44"),
         ("$Elements\n1\n", "$Elements\n7\n", "7 cells announced, 1 lines found"),
         ("3 0 1 0", "3 0 one 0", "expected numbers only"),
-        ("$Nodes\n4", "$Nodes\nfour", "could not be read as a Gmsh file: it is damaged or of another kind (ValueError"),
+        ("$Nodes\n4", "$Nodes\nfour", "could not be read as MSH 2.2, 4.1 (Gmsh): it is damaged or of another kind"),
         ("$Elements\n1\n1 4 2 1 1 1 2 3 4\n$EndElements\n", "", "expected a section $Elements"),
         ("$EndNodes", "$EndNodes\n$Nodes\n0\n$EndNodes", "section $Nodes is there twice"),
     ],

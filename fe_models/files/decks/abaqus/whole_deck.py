@@ -11,7 +11,7 @@ from fe_models.files.abaqus_deck import DeckBlock, deck_blocks, refuse_unread
 from fe_models.files.decks.abaqus.assembly import flat_assembly
 from fe_models.files.decks.abaqus.couplings import equations_in_basic_axes, read_coupling
 from fe_models.files.decks.abaqus.draft import Draft
-from fe_models.files.decks.abaqus.elements import faces_of, read_element
+from fe_models.files.decks.abaqus.elements import SOLID_RULES, faces_of, read_element
 from fe_models.files.decks.abaqus.keywords import HARMLESS, PARAMETERS, check_parameters
 from fe_models.files.decks.abaqus.layups import layups_in_axes
 from fe_models.files.decks.abaqus.materials import materials_in_axes, numbers, read_material
@@ -22,7 +22,7 @@ from fe_models.files.decks.ledger import Ledger
 from fe_models.foundation.arrays import IntArray
 from fe_models.meshes.cells.raw_mesh import RawBlock
 
-__all__ = ["PROGRAMS", "read_abaqus_deck", "read_boundary", "read_load"]
+__all__ = ["read_abaqus_deck", "read_boundary", "read_load"]
 
 # supports and loads ---------------------------------------------------------------------------------------------------
 
@@ -149,7 +149,6 @@ def _surface_faces(here: str, draft: Draft, name: str) -> dict[str, IntArray]:
 # whole deck -----------------------------------------------------------------------------------------------------------
 
 
-PROGRAMS = ("calculix", "abaqus")  #: programs whose rules for integration and mass may apply to a deck
 _MESH = (
     "NODE", "ELEMENT", "NSET", "ELSET", "HEADING", "PREPRINT", "PART", "END PART", "ASSEMBLY", "END ASSEMBLY",
     "INSTANCE", "END INSTANCE", "INCLUDE", "SYSTEM",
@@ -210,8 +209,8 @@ def read_abaqus_deck(path: Path, data: bytes, *, program: str = "calculix") -> D
         If the deck is damaged. Content that cannot be converted is in the ledger.
     """
     where = f"deck {path}"
-    if program not in PROGRAMS:
-        raise MeshError(f"{where}: unknown program {program!r}; expected one of {', '.join(PROGRAMS)}")
+    if program not in SOLID_RULES:
+        raise MeshError(f"{where}: unknown program {program!r}; expected one of {', '.join(SOLID_RULES)}")
     included: dict[str, str] = {}
     blocks = deck_blocks(where, data.decode("utf-8", "replace"), path.parent, included)
     blocks = [replace(block, keyword=_SQUEEZED.get(block.keyword.replace(" ", ""), block.keyword)) for block in blocks]

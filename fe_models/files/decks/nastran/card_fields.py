@@ -110,7 +110,7 @@ HARMLESS = frozenset(
 #: properties and materials that no supported element refers to; the elements that do are refused by name
 UNNAMED = frozenset(
     "MAT3 MAT9 MAT10 MAT11 MATF MATG MATHE MATORT MATEP PACABS PACBAR PAABSF PAXISYM PBCOMP PBEAM3 "
-    "PBUSH2D PCOHE PCONEAX PFAST PSEAM PSHEAR PRAC2D PRAC3D PWELD PSHLN1 PSHLN2 "
+    "PBUSH2D PCOHE PCONEAX PFAST PSEAM PRAC2D PRAC3D PSHLN1 PSHLN2 "
     "PSLDN1".split()
 )
 #: cards that change another card in nonlinear analyses, or with frequency; that card is used unchanged

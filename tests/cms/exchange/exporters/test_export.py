@@ -11,7 +11,6 @@ from cms.body.modal_file.file import convert_units
 from cms.cli.app import app
 from cms.errors import ExportError, ModalFileError, UnitsError
 from cms.exchange.export import WRITERS, export_body
-from cms.exchange.exporters.formats import FORMATS
 from fe_models.foundation.units import unit_system
 from tests.cms.exchange.exporters.small_bodies import cloud_body
 from tests.synthetic import synthetic_reduced_body
@@ -33,17 +32,12 @@ def run(*arguments):
     return CliRunner().invoke(app, ["export", *[str(argument) for argument in arguments]])
 
 
-def test_the_table_of_writers_is_that_of_the_formats():
-    assert sorted(WRITERS) == sorted(known.key for known in FORMATS)
-    assert all(known.writes for known in FORMATS)
-
-
 FLOATING = ("mbsim", "exudyn", "mbdyn", "sid_fem", "sid_fem-fembeam")
 
 
 @pytest.mark.parametrize("to", [*FLOATING, "vtk"])
 def test_the_command_writes_and_says_what_is_left_out(to, modal_file, tmp_path):
-    suffix = next(known.suffixes[0] for known in FORMATS if known.key == to)
+    suffix = WRITERS[to].suffixes[0]
     result = run(modal_file, "--to", to, "--units", "m-kg-s", "-o", tmp_path / f"out{suffix}")
     assert result.exit_code == 0, result.output
     assert f"wrote {tmp_path / 'out'}" in result.output

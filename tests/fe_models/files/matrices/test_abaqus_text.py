@@ -66,7 +66,7 @@ def test_one_triangle_is_mirrored_and_said(block, tmp_path):
         ("1 1 2.0\n2 2 1.0\n2 2 1.0\n", "1 entries are listed twice"),
         ("1 1 2.0\n1 2 1.0\n2 1 -1.0\n2 2 1.0\n", "expected a symmetric matrix"),
         ("1 1 2.0\n999999999999 2 1.0\n", "expected at most 27 rows in a file of 27 bytes"),
-        ("heading\n", "or Abaqus matrix (COORDINATE), got a file that begins"),
+        ("heading\n", "or *MATRIX GENERATE, COORDINATE (Abaqus), got a file that begins"),
         ("", "the file is empty"),
     ],
 )
