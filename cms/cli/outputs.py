@@ -74,7 +74,7 @@ def write_outputs(
     table: Callable[[], "Table"] | None = None,
     record: Any = None,
     document: Callable[[], "Document"] | None = None,
-    figure: Callable[[], "Figure"] | None = None,
+    figure: Callable[[], "Figure | Sequence[Figure]"] | None = None,
     dpi: int = 130,
     others: Mapping[str, Callable[[Path], bytes | Mapping[Path, bytes]]] | None = None,
     is_quiet: bool = False,
@@ -92,7 +92,7 @@ def write_outputs(
     document
         Returns the document, for `DOCUMENTS`.
     figure
-        Returns the figure, for `PICTURES`.
+        Returns the figure, for `PICTURES`, or the pages: one .pdf, or rod.png, rod-2.png, rod-3.png.
     dpi
         Resolution of a .png.
     others
@@ -119,10 +119,28 @@ def write_outputs(
             contents[path] = table().content(ending, str(path))
         else:
             assert figure is not None  # the suffixes have been checked
-            picture = io.BytesIO()
-            figure().savefig(picture, format=ending[1:], dpi=dpi)
-            contents[path] = picture.getvalue()
+            drawn = figure()
+            contents |= picture_files(path, drawn if isinstance(drawn, Sequence) else [drawn], dpi)
     replace_files(contents)
     if not is_quiet:
         for path, content in contents.items():
             say(f"wrote {path} ({len(content) / 1e6:.2f} MB)")
+
+
+def picture_files(path: Path, pages: "Sequence[Figure]", dpi: int) -> dict[Path, bytes]:
+    """Return the contents of one .pdf with all pages, or of a picture for each page: rod.png, rod-2.png, ..."""
+    from matplotlib.backends.backend_pdf import PdfPages
+
+    ending = path.suffix.lower()
+    if ending == ".pdf":
+        whole = io.BytesIO()
+        with PdfPages(whole) as document:
+            for page in pages:
+                document.savefig(page)
+        return {path: whole.getvalue()}
+    contents = {}
+    for number, page in enumerate(pages, start=1):
+        picture = io.BytesIO()
+        page.savefig(picture, format=ending[1:], dpi=dpi)
+        contents[path if number == 1 else path.with_stem(f"{path.stem}-{number}")] = picture.getvalue()
+    return contents

@@ -374,7 +374,8 @@ def plot_command(
 
     The plots show positions, energies, elastic displacement, reactions, energy error, joint drift and sensors.
 
-    Without -o, the picture is written next to the results: swing.h5 gives swing.png.
+    Without -o, the picture is written next to the results: swing.h5 gives swing.png. More than eight panels go into
+    pages: swing.png, swing-2.png, or one .pdf.
 
     Example: floatframe plot swing.h5 -o swing.png
 
@@ -385,9 +386,9 @@ def plot_command(
     from cms.errors import CmsError
     from floatframe.errors import ResultsError
     from floatframe.pictures.animation import bodies_of
-    from floatframe.pictures.overview import plot_overview
+    from floatframe.pictures.overview import overview_pages
     from floatframe.results.sensor_choice import chosen_measurements
-    from floatframe.results.sensor_plots import plot_sensors
+    from floatframe.results.sensor_plots import sensor_pages
     from floatframe.results.sensors import measured
     from floatframe.results.trajectory import read_trajectory
 
@@ -409,11 +410,11 @@ def plot_command(
                 "--sensor: the system file of the run does not exist any more, or the run was made in Python"
             )
         chosen = chosen_measurements(system, trajectory, sensors)
-        figure = plot_sensors(chosen, title=system.name, time_symbol=system.units.time_symbol)
+        figures = sensor_pages(chosen, title=system.name, time_symbol=system.units.time_symbol)
     else:
         found = [] if system is None else [*measured(system, trajectory).values()]
-        figure = plot_overview(trajectory, bodies, found)
-    write_outputs([path], figure=lambda: figure)
+        figures = overview_pages(trajectory, bodies, found)
+    write_outputs([path], figure=lambda: figures)
 
 
 @guarded

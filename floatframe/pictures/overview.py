@@ -1,4 +1,4 @@
-"""One figure of a computed motion: positions, energies, elastic displacements, loads, errors."""
+"""Figures of a computed motion: positions, energies, elastic displacements, loads, errors."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -11,7 +11,7 @@ from fe_models.foundation.arrays import Array
 from floatframe.errors import ResultsError
 from floatframe.pictures.plots import axes_for, labelled, plot_drift, plot_energies, plot_energy_balance
 from floatframe.results.recovery import elastic_displacements, interface_positions
-from floatframe.results.sensor_plots import groups_of, plot_measurement
+from floatframe.results.sensor_plots import groups_of, pages_of, plot_measurement
 from floatframe.results.sensors.measurement import Measurement
 from floatframe.results.trajectory import Trajectory
 
@@ -19,19 +19,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["free_legends", "plot_deformation", "plot_loads", "plot_overview", "plot_places"]
+__all__ = ["overview_pages", "plot_deformation", "plot_loads", "plot_places"]
 
-LEGEND_GAP = 0.03  #: gap between curves and a legend above them, as a share of the height of a panel
-MOST_LEGEND = 0.5  #: largest share of the height of a panel that is kept free for a legend
 MOST_CURVES = 8  #: largest number of curves in a plot; if there are more, those with the largest values are drawn
 
 
-def plot_overview(
+def overview_pages(
     trajectory: Trajectory,
     bodies: Mapping[str, ReducedBody] | None = None,
     measurements: Sequence[Measurement] = (),
-) -> "Figure":
-    """Return a figure with a panel for each kind of result that the motion has.
+) -> list["Figure"]:
+    """Return pages with a panel for each kind of result that the motion has.
 
     Parameters
     ----------
@@ -47,8 +45,6 @@ def plot_overview(
     ResultsError
         If the trajectory has no rows.
     """
-    from matplotlib.figure import Figure
-
     if len(trajectory.t) == 0:
         raise ResultsError("plot: the trajectory has no rows")
     known = dict(bodies or {})
@@ -65,37 +61,9 @@ def plot_overview(
         panels.append(lambda ax: plot_drift(trajectory, ax))
     for measurement in measurements:
         for columns in groups_of(measurement):
-            panels.append(partial(sensor_panel, trajectory, measurement, columns))
-    n_rows = (len(panels) + 1) // 2
-    figure = Figure(figsize=(13, 3.4 * n_rows + 0.6), layout="constrained")
-    figure.suptitle(trajectory.head.system)
-    axes = figure.subplots(n_rows, 2, squeeze=False).ravel()
-    for panel, ax in zip(panels, axes, strict=False):
-        panel(ax)
-    for ax in axes[len(panels) :]:
-        ax.remove()
-    free_legends(figure)
-    return figure
-
-
-def free_legends(figure: "Figure") -> None:
-    """Make room above the curves of a finished figure for those legends that cover a curve, on linear axes."""
-    figure.draw_without_rendering()
-    for ax in figure.axes:
-        legend = ax.get_legend()
-        if legend is None or ax.get_yscale() != "linear":
-            continue
-        box = legend.get_window_extent()
-        if any(box.count_contains(line.get_transform().transform(line.get_xydata())) for line in ax.get_lines()):
-            share = min(box.height / ax.get_window_extent().height + LEGEND_GAP, MOST_LEGEND)
-            bottom, top = ax.get_ylim()
-            ax.set_ylim(bottom, bottom + (top - bottom) / (1 - share))
-            legend.set_loc("upper right")
-
-
-def sensor_panel(trajectory: Trajectory, measurement: Measurement, columns: tuple[str, ...], ax: "Axes") -> "Axes":
-    """Plot columns of a sensor that have one unit."""
-    return plot_measurement(measurement, ax, columns=columns, time_symbol=trajectory.units.time_symbol)
+            symbol = trajectory.units.time_symbol
+            panels.append(partial(plot_measurement, measurement, columns=columns, time_symbol=symbol))
+    return pages_of(panels, title=trajectory.head.system)
 
 
 def plot_places(trajectory: Trajectory, bodies: Mapping[str, ReducedBody], ax: "Axes | None" = None) -> "Axes":

@@ -25,7 +25,7 @@ from floatframe.model.system import System
 from floatframe.results.place_motion import PlaceMotion, interface_motion, nodal_stress
 from floatframe.results.recovery import nodal_displacements
 from floatframe.results.sensor_choice import chosen_measurements, controller_samples
-from floatframe.results.sensor_plots import figure_of, plot_columns, plot_sensors
+from floatframe.results.sensor_plots import figure_of, plot_columns, sensor_pages
 from floatframe.results.sensors import coordinate_sensors, measured, measurement_of, sensors_of
 from floatframe.results.sensors.joint_coordinate import JointCoordinate
 from floatframe.results.sensors.measurement import Measurement
@@ -127,7 +127,7 @@ class Motion(Trajectory):
         units = {one.channel(name): unit for one in chosen for name, unit in one.units.items()}
         return Table({"t": self.t, **columns}, {"t": self.units.time_symbol, **units})
 
-    def plot(self, *names: str, ax: "Axes | None" = None) -> "Figure":
+    def plot(self, *names: str, ax: "Axes | None" = None, page: int = 1) -> "Figure":
         """Plot measurements over time (see `measurements`), with units of the system at the axes.
 
         Parameters
@@ -138,6 +138,9 @@ class Motion(Trajectory):
         ax
             Axes of a figure, into which all columns are drawn; they must have one unit. None: a new figure, with a
             panel for each sensor and unit, and a dozen curves at most in each.
+        page
+            Number of the page of the new figure, from 1; a page has eight panels at most, and its title says how many
+            pages there are.
 
         Returns
         -------
@@ -147,11 +150,14 @@ class Motion(Trajectory):
         Raises
         ------
         ResultsError
-            If there is nothing to plot, or columns for given axes have several units.
+            If there is nothing to plot, there is no such page, or columns for given axes have several units.
         """
         chosen, symbol = self.measurements(*names), self.units.time_symbol
         if ax is None:
-            return plot_sensors(chosen, title=self.head.system, time_symbol=symbol)
+            pages = sensor_pages(chosen, title=self.head.system, time_symbol=symbol)
+            if not 1 <= page <= len(pages):
+                raise ResultsError(f"plot: page = {page}: expected a page from 1 to {len(pages)}")
+            return pages[page - 1]
         plot_columns(chosen, ax, time_symbol=symbol)
         return figure_of(ax)
 

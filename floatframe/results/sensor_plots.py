@@ -1,6 +1,7 @@
-"""Plots of measurements over time: each panel has the columns of one unit, at most a dozen curves."""
+"""Plots of measurements over time: panels of one unit and at most a dozen curves, pages of at most eight panels."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,12 +13,25 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["figure_of", "groups_of", "labelled", "panels_of", "plot_columns", "plot_measurement", "plot_sensors"]
+__all__ = [
+    "figure_of",
+    "free_legends",
+    "groups_of",
+    "labelled",
+    "pages_of",
+    "panels_of",
+    "plot_columns",
+    "plot_measurement",
+    "sensor_pages",
+]
 
 ROUNDING = 1e-9  #: magnitude, relative to the largest column of a unit, below which a curve is a rounding error
 MOST_CURVES = 12  #: largest number of curves in a panel; further columns go into additional panels
 N_COLORS = 10  #: number of colours, after which they repeat with dashed lines
 LONG_LEGEND = 6  #: number of entries above which a legend has two columns
+MOST_PANELS = 8  #: largest number of panels on a page
+LEGEND_GAP = 0.03  #: gap between curves and a legend above them, as a share of the height of a panel
+MOST_LEGEND = 0.5  #: largest share of the height of a panel that is kept free for a legend
 
 
 def panels_of(measurement: Measurement) -> tuple[tuple[str, tuple[str, ...]], ...]:
@@ -93,30 +107,63 @@ def plot_columns(measurements: Sequence[Measurement], ax: "Axes", *, time_symbol
     return labelled(ax, f"{names[0]} [{unit}]" if len(names) == 1 else f"[{unit}]")
 
 
-def plot_sensors(measurements: Sequence[Measurement], *, title: str = "", time_symbol: str = "s") -> "Figure":
-    """Return a figure with panels for every sensor, each with the columns of one unit, at most a dozen.
+def sensor_pages(measurements: Sequence[Measurement], *, title: str = "", time_symbol: str = "s") -> list["Figure"]:
+    """Return pages with panels for every sensor, each with the columns of one unit, at most a dozen.
 
     Raises
     ------
     ResultsError
         If there is nothing to plot.
     """
-    from matplotlib.figure import Figure
-
-    panels = [(measurement, columns) for measurement in measurements for columns in groups_of(measurement)]
+    panels = [
+        partial(plot_measurement, measurement, columns=columns, time_symbol=time_symbol)
+        for measurement in measurements
+        for columns in groups_of(measurement)
+    ]
     if not panels:
         raise ResultsError("plot: no sensor to plot; name a joint coordinate, or add tables [sensors.NAME]")
-    n_columns = 1 if len(panels) == 1 else 2
-    n_rows = (len(panels) + n_columns - 1) // n_columns
-    figure = Figure(figsize=(6.5 * n_columns, 3.4 * n_rows + 0.6), layout="constrained")
-    if title:
-        figure.suptitle(title)
-    axes = figure.subplots(n_rows, n_columns, squeeze=False).ravel()
-    for (measurement, columns), ax in zip(panels, axes, strict=False):
-        plot_measurement(measurement, ax, columns=columns, time_symbol=time_symbol)
-    for ax in axes[len(panels) :]:
-        ax.remove()
-    return figure
+    return pages_of(panels, title=title)
+
+
+def pages_of(panels: "Sequence[Callable[[Axes], Axes]]", *, title: str = "") -> list["Figure"]:
+    """Return figures of at most eight panels each, in two columns; each panel is a function that draws into its axes.
+
+    The titles of several pages end in "page 1 of 3".
+    """
+    from matplotlib.figure import Figure
+
+    pages = [panels[first : first + MOST_PANELS] for first in range(0, len(panels), MOST_PANELS)]
+    figures = []
+    for number, page in enumerate(pages, start=1):
+        n_columns = 1 if len(panels) == 1 else 2
+        n_rows = (len(page) + n_columns - 1) // n_columns
+        figure = Figure(figsize=(6.5 * n_columns, 3.4 * n_rows + 0.6), layout="constrained")
+        words = [title, f"page {number} of {len(pages)}" if len(pages) > 1 else ""]
+        if any(words):
+            figure.suptitle(", ".join(word for word in words if word))
+        axes = figure.subplots(n_rows, n_columns, squeeze=False).ravel()
+        for panel, ax in zip(page, axes, strict=False):
+            panel(ax)
+        for ax in axes[len(page) :]:
+            ax.remove()
+        free_legends(figure)
+        figures.append(figure)
+    return figures
+
+
+def free_legends(figure: "Figure") -> None:
+    """Make room above the curves of a finished figure for those legends that cover a curve, on linear axes."""
+    figure.draw_without_rendering()
+    for ax in figure.axes:
+        legend = ax.get_legend()
+        if legend is None or ax.get_yscale() != "linear":
+            continue
+        box = legend.get_window_extent()
+        if any(box.count_contains(line.get_transform().transform(line.get_xydata())) for line in ax.get_lines()):
+            share = min(box.height / ax.get_window_extent().height + LEGEND_GAP, MOST_LEGEND)
+            bottom, top = ax.get_ylim()
+            ax.set_ylim(bottom, bottom + (top - bottom) / (1 - share))
+            legend.set_loc("upper right")
 
 
 def figure_of(ax: "Axes") -> "Figure":

@@ -386,7 +386,7 @@ def test_the_demo_runs_the_whole_line_and_lists_its_files(tmp_path, monkeypatch)
         "floatframe.pictures.animation.animate",
     ):  # fmt: skip
         monkeypatch.setattr(name, blank)
-    monkeypatch.setattr("floatframe.pictures.overview.plot_overview", lambda *_: Figure())
+    monkeypatch.setattr("floatframe.pictures.overview.overview_pages", lambda *_: Figure())
     monkeypatch.setattr(demo, "begun", begun_here)
     monkeypatch.setattr(demo, "kernels_compiled_beside", lambda: contextlib.nullcontext(lambda: None))
     assert_demo_makes_its_files(tmp_path, monkeypatch)

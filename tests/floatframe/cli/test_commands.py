@@ -112,6 +112,19 @@ def test_plot_draws_a_picture(results, tmp_path, suffix, magic):
     assert sorted(contents(tmp_path)) == [f"swing.{suffix}"]
 
 
+def test_plot_writes_more_than_eight_panels_as_pages(folder):
+    """Five panels of every motion and four sensors are nine: a second picture, or a second page of the .pdf."""
+    sensors = [f'[sensors.at_{k}]\ntype = "position"\nbody = "stick"\nmarker = [{k}, 0, 0]\n' for k in range(4)]
+    text = (folder / "swing.toml").read_text()
+    (folder / "swing.toml").write_text("\n".join([text, *sensors]))
+    for words in (("run", "swing.toml"), ("plot", "swing.h5"), ("plot", "swing.h5", "-o", "swing.pdf")):
+        result = run(words[0], *(folder / word if "." in word else word for word in words[1:]))
+        assert result.exit_code == 0, result.output
+    assert {"swing.png", "swing-2.png", "swing.pdf"} < set(contents(folder))
+    assert "swing-3.png" not in contents(folder)
+    assert (folder / "swing.pdf").read_bytes().count(b"/Type /Page ") == 2
+
+
 def test_plot_goes_without_the_modal_files_and_says_so(folder):
     write(synthetic_reduced_body(), folder / "part.h5")
     (folder / "spin.toml").write_text(FLEXIBLE)

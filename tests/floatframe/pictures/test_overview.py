@@ -3,7 +3,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from floatframe import GROUND, FlexibleBody, GeneralizedAlpha, Gravity, Marker, RevoluteJoint, RigidBody, System
-from floatframe.pictures.overview import plot_deformation, plot_loads, plot_overview, plot_places
+from floatframe.pictures.overview import overview_pages, plot_deformation, plot_loads, plot_places
 from floatframe.pictures.plots import plot_drift, plot_energy_balance
 from floatframe.results.energy_balance import balance_defect, energy_scale
 from floatframe.results.recovery import elastic_displacements, interface_positions
@@ -66,7 +66,7 @@ def test_of_many_curves_the_largest_are_drawn():
 
 
 def test_the_overview_has_a_panel_for_each_kind_of_result(body, motion):
-    labels = [ax.get_ylabel().split(" [")[0] for ax in plot_overview(motion, {"part": body}).axes]
+    labels = [ax.get_ylabel().split(" [")[0] for ax in overview_pages(motion, {"part": body})[0].axes]
     assert labels == [
         "position",
         "energy",
@@ -75,7 +75,7 @@ def test_the_overview_has_a_panel_for_each_kind_of_result(body, motion):
         "force in joints and springs",
         "drift of joints",
     ]
-    assert any(ax.get_ylabel().startswith("modal") for ax in plot_overview(motion).axes)
+    assert any(ax.get_ylabel().startswith("modal") for ax in overview_pages(motion)[0].axes)
     rigid = System([RigidBody("ball", 1.0, np.eye(3), velocity=(1, 0, 0))])
-    fewer = plot_overview(integrate(rigid, GeneralizedAlpha(), t_end=0.01, h=1e-3))
+    (fewer,) = overview_pages(integrate(rigid, GeneralizedAlpha(), t_end=0.01, h=1e-3))
     assert len(fewer.axes) == 3

@@ -10,7 +10,7 @@ from numpy.testing import assert_array_equal
 
 from floatframe import GeneralizedAlpha, integrate
 from floatframe.pictures import plots
-from floatframe.pictures.overview import free_legends
+from floatframe.results.sensor_plots import free_legends
 from floatframe.results.trajectory import Trajectory
 from tests.floatframe.results.examples import SYSTEM
 

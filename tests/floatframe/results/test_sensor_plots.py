@@ -10,7 +10,8 @@ from numpy.testing import assert_allclose
 from fe_models.foundation.units import unit_system
 from floatframe import GeneralizedAlpha, Gravity, Marker, RevoluteJoint, RigidBody, SphericalJoint, System, integrate
 from floatframe.errors import ModelError, ResultsError
-from floatframe.results.sensor_plots import groups_of, plot_measurement, plot_sensors
+from floatframe.results.motion import motion_of
+from floatframe.results.sensor_plots import groups_of, plot_measurement, sensor_pages
 from floatframe.results.sensors import PlaceSensor, ReactionSensor, measured, measurement_of
 from floatframe.results.sensors.measurement import Measurement
 
@@ -29,7 +30,7 @@ def motion():
 
 def test_a_quantity_that_is_zero_is_drawn_as_zero(motion):
     reaction = measured(SWING, motion)["pin force"]
-    for ax in plot_sensors([reaction]).axes:
+    for ax in sensor_pages([reaction])[0].axes:
         assert ax.lines, f"nothing is drawn in the panel {ax.get_ylabel()}"
     columns = next(group for group in groups_of(reaction) if "moment" in group[0])
     assert not np.any(plot_measurement(reaction, columns=columns).lines[0].get_ydata())
@@ -101,5 +102,18 @@ def test_more_than_a_dozen_columns_are_drawn_in_groups():
     groups = groups_of(whole)
     assert [len(group) for group in groups] == [10, 10, 9]
     assert [name for group in groups for name in group] == list(many)[:29]
-    figure = plot_sensors([whole])
+    (figure,) = sensor_pages([whole])
     assert [[line.get_label() for line in ax.lines] for ax in figure.axes] == [list(group) for group in groups]
+
+
+def test_many_sensors_are_drawn_on_pages_of_eight_panels(motion):
+    """Of 20 panels, page 3 has the last four; the title of a page says where it is."""
+    many = replace(SWING, sensors=[PlaceSensor(f"at {k}", Marker("bob")) for k in range(20)])
+    moved = motion_of(motion, many)
+    pages = [moved.plot("at *", page=number) for number in (1, 2, 3)]
+    assert [len(page.axes) for page in pages] == [8, 8, 4]
+    assert pages[2].get_suptitle() == "system, page 3 of 3"
+    assert [ax.get_title() for page in pages for ax in page.axes] == [sensor.name for sensor in many.sensors]
+    assert max(page.get_size_inches()[1] for page in pages) < 15
+    with pytest.raises(ResultsError, match="page = 4: expected a page from 1 to 3"):
+        moved.plot("at *", page=4)
