@@ -13,6 +13,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, TypeVar, get_args
 
+from annotated_types import Len
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, ValidationInfo
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
@@ -156,7 +157,7 @@ def validated(
     except ValidationError as problem:
         details = problem.errors(include_url=False)
         place = data.place if isinstance(data, FileContent) else lambda location: ""
-        problems = [f"{describe(model, detail)}{place(detail['loc'])}" for detail in details[:MOST_PROBLEMS]]
+        problems = [f"{describe(model, detail, data)}{place(detail['loc'])}" for detail in details[:MOST_PROBLEMS]]
     n = len(details)
     if n == 1:
         raise error(f"{path}: {problems[0]}")
@@ -176,15 +177,17 @@ def files_named(value: Any) -> tuple[Path, ...]:
     return tuple(path for each in value for path in files_named(each)) if isinstance(value, list | tuple) else ()
 
 
-def describe(model: type[BaseModel], detail: ErrorDetails) -> str:
-    """Return one problem as 'key.path = value: what is wrong or expected'."""
+def describe(model: type[BaseModel], detail: ErrorDetails, data: Any = None) -> str:
+    """Return one problem in the data of a model as 'key.path = value: what is wrong or expected'."""
     location = detail["loc"]
     key = key_path(location)
-    parent = table_at(model, location[:-1]) if location else None
+    parent = table_at(model, location[:-1], data) if location else None
     fields = fields_of(parent) if parent is not None else {}
     field = fields.get(str(location[-1])) if location else None
     if detail["type"] == "extra_forbidden":
-        return f"{key}: unknown key{nearest(str(location[-1]), fields)}"
+        title = parent.model_config.get("title") if parent is not None else None
+        kind = "" if title is None else f' of type "{title}"'
+        return f"{key}: unknown key{kind}{nearest(str(location[-1]), fields)}"
     expected = (field.description if field is not None else None) or "a table of keys"
     if detail["type"] == "missing":
         return f"{key}: missing; expected {expected}"
@@ -210,18 +213,26 @@ def key_path(location: Sequence[str | int]) -> str:
     )
 
 
-def table_at(model: type[BaseModel], location: Sequence[str | int]) -> type[BaseModel] | None:
-    """Return the model of the table at this location, or None if there is none."""
+def table_at(model: type[BaseModel], location: Sequence[str | int], data: Any = None) -> type[BaseModel] | None:
+    """Return the model of the table at this location, or None if there is none.
+
+    An annotation with a method `model_of(table)` chooses the model by the table in the data.
+    """
     here: Any = model
     for part in location:
+        notes: tuple[Any, ...] = ()
         if isinstance(here, type) and issubclass(here, BaseModel):
             field = fields_of(here).get(str(part))
-            here = field.annotation if field is not None else None
+            here, notes = (field.annotation, tuple(field.metadata)) if field is not None else (None, ())
         else:
             here = (get_args(here) or (None,))[-1]  # dict[str, Table], list[Table]
         given = [option for option in get_args(here) if option is not type(None)]
         if type(None) in get_args(here) and len(given) == 1:
             here = given[0]  # Table | None
+        inside: Any = dict(enumerate(data)) if isinstance(data, list) else data
+        data = inside.get(part) if isinstance(inside, Mapping) else None
+        notes = (*notes, *getattr(here, "__metadata__", ()))
+        here = next((note.model_of(data) for note in notes if hasattr(note, "model_of")), here)
     return here if isinstance(here, type) and issubclass(here, BaseModel) else None
 
 
@@ -344,9 +355,15 @@ def existing_file(what: str = "file") -> Callable[[Any, ValidationInfo], Path]:
 
 
 PathBeside = Annotated[Path, BeforeValidator(beside, json_schema_input_type=str)]
-Vector3 = Annotated[tuple[float, float, float], BeforeValidator(numbers)]
+ThreeOf = Len(3, 3)
+Vector3 = Annotated[
+    tuple[float, float, float], BeforeValidator(numbers, json_schema_input_type=Annotated[list[float], ThreeOf])
+]
 Range = Annotated[tuple[float, float], BeforeValidator(interval)]
-Matrix3 = Annotated[tuple[Vector3, Vector3, Vector3], BeforeValidator(rows)]
+Matrix3 = Annotated[
+    tuple[Vector3, Vector3, Vector3],
+    BeforeValidator(rows, json_schema_input_type=Annotated[list[Annotated[list[float], ThreeOf]], ThreeOf]),
+]
 
 
 def changed(content: FileContent, changes: Mapping[str, Any], where: str, error: type[Exception]) -> FileContent:

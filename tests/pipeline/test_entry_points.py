@@ -1,4 +1,4 @@
-"""A package of its own adds a mode set, an element and a reader by entry points, without an edit here."""
+"""A package of its own adds a mode set, an element, a joint and a reader by entry points, without an edit here."""
 
 import subprocess
 import sys
@@ -19,6 +19,7 @@ from cms.modes.families.families import families_of
 from cms.modes.mode_set import constraint_block, mode_set
 from fe_models.meshes.cells.raw_mesh import RawBlock, RawMesh
 from floatframe import Marker
+from floatframe.joints import ScrewJoint
 from floatframe.model import Element, ElementLaw
 
 
@@ -49,6 +50,27 @@ class Push(Element):
 
     def law(self, placed):
         return ElementLaw(function=push, data=[self.force])
+
+
+@dataclass(frozen=True, eq=False)
+class Bolt(ScrewJoint):
+    """A screw with several threads beside each other.
+
+    Parameters
+    ----------
+    pitch
+        Distance of neighbouring threads [m].
+    starts
+        Number of threads.
+    """
+
+    pitch: float = 0.0
+    starts: int = 1
+    lead: float = 0.0
+
+    def __post_init__(self):
+        object.__setattr__(self, "lead", self.pitch * self.starts)
+        super().__post_init__()
 '''
 
 POINTS = """
@@ -62,15 +84,21 @@ acme.push = acme_fe:Push
 acme.broken = acme_fe.nowhere:missing
 acme.number = acme_fe:np
 
+[floatframe.joints]
+acme.bolt = acme_fe:Bolt
+revolute = acme_fe:Bolt
+acme.broken = acme_fe.nowhere:missing
+
 [fe_models.readers]
 plain = acme_fe:read_plain
 broken = acme_fe.nowhere:missing
 """
 
 USE = """
-import logging, pathlib
+import json, logging, pathlib
 import numpy as np
 import cms, fe_models, floatframe as ff
+from fe_models.foundation.parametric_file import schema_text
 from floatframe.model.elements.registry import element_class
 from tests.bodies import bar
 
@@ -91,6 +119,14 @@ units = "m-kg-s"
 [bodies.block]
 mass = 2.0
 inertia = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+[joints.bolt]
+type = "acme.bolt"
+body_a = "ground"
+body_b = "block"
+marker_b = [0, 0, 0]
+axis = [0, 0, 1]
+pitch = 0.25
+starts = 2
 [elements.up]
 type = "acme.push"
 marker = {body = "block"}
@@ -101,12 +137,24 @@ h = 0.01
 ''')
 system, run = ff.read_system("push.toml")
 motion = ff.integrate(system, run.integrator, run.t_end, run.h)
-np.testing.assert_allclose(motion.body("block").r[-1, 2], 0.75, rtol=1e-9)
+np.testing.assert_allclose(motion.body("block").r[-1, 2], 0.75 / (1 + (2 * np.pi / 0.5) ** 2 / 2), rtol=1e-6)
+
+text = pathlib.Path("push.toml").read_text()
+def changed(old, new):
+    pathlib.Path("wrong.toml").write_text(text.replace(old, new))
+    ff.read_system("wrong.toml")
+
+bolt = json.loads(schema_text("system"))["$defs"]["Bolt"]
+assert "several threads" in bolt["description"]
+assert bolt["properties"]["starts"]["description"] == "a whole number: Number of threads"
 
 for call, error in (
     (lambda: cms.MODE_SETS["broken"], cms.errors.ModeSetError),
     (lambda: element_class("acme.broken"), ff.errors.ModelError),
     (lambda: element_class("acme.number"), ff.errors.ModelError),
+    (lambda: changed("starts = 2", "start = 2"), ff.errors.SystemFileError),
+    (lambda: changed("acme.bolt", "acme.blt"), ff.errors.SystemFileError),
+    (lambda: changed("acme.bolt", "acme.broken"), ff.errors.SystemFileError),
     (lambda: fe_models.read_mesh(pathlib.Path("one.plain").rename("one.broken")), fe_models.errors.MeshError),
 ):
     try:
@@ -127,17 +175,21 @@ def folder(tmp_path):
     return tmp_path
 
 
-def test_a_package_adds_a_mode_set_an_element_and_a_reader(folder, monkeypatch):
+def test_a_package_adds_a_mode_set_an_element_a_joint_and_a_reader(folder, monkeypatch):
     """Used in Python and in files; what cannot be loaded is told with the name of its package, when it is used."""
     monkeypatch.setenv("PYTHONPATH", f"{folder}:{ROOT}")
     done = subprocess.run([sys.executable, "-c", USE], cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    lines = done.stdout.splitlines()
-    assert [line.split(" of package ")[0] for line in lines] == [
-        "cms.mode_sets 'broken'", "floatframe.elements 'acme.broken'", "floatframe.elements 'acme.number'",
-        "fe_models.readers '.broken'",
-    ]  # fmt: skip
-    assert all(" of package acme-fe 1.2: " in line for line in lines)
-    assert "ModuleNotFoundError: No module named 'acme_fe.nowhere'" in lines[0]
-    assert "expected a class that derives from Element" in lines[2]
-    assert "cms.mode_sets 'rubin' of package acme-fe 1.2: left out, this project has it" in done.stderr
+    *own, last = done.stdout.splitlines()
+    modes, element, number, key, kind, joint = own
+    assert "cms.mode_sets 'broken' of package acme-fe 1.2: " in modes
+    assert "ModuleNotFoundError: No module named 'acme_fe.nowhere'" in modes
+    assert "floatframe.elements 'acme.broken' of package acme-fe 1.2: " in element
+    assert "floatframe.elements 'acme.number' of package acme-fe 1.2: " in number
+    assert "expected a class that derives from Element" in number
+    assert "joints.bolt.start: unknown key of type \"acme.bolt\"; did you mean 'starts'?" in key
+    assert "unknown type of joint; did you mean 'acme.bolt'?" in kind
+    assert "joints.bolt: floatframe.joints 'acme.broken' of package acme-fe 1.2: " in joint
+    assert "fe_models.readers '.broken' of package acme-fe 1.2: " in last
+    for group, name in (("cms.mode_sets", "rubin"), ("floatframe.joints", "revolute")):
+        assert f"{group} '{name}' of package acme-fe 1.2: left out, this project has it" in done.stderr

@@ -93,7 +93,7 @@ def joint_forces(
         friction=[force.friction for force in ordered],
         coefficient=[force.friction_coefficient for force in ordered],
         speed=[force.friction_speed for force in ordered],
-        motor=[functions.index(force.motor) for force in ordered],
+        motor=[functions.index(force.motor) for force in ordered],  # type: ignore[arg-type]  # no number any more
         table=[functions.index(force.characteristic) for force in ordered],
     )
     return record, [0, *np.cumsum([len(group) for group in of_row], dtype=int)]

@@ -24,7 +24,7 @@ from floatframe.model.shapes.shape import Shape
 
 __all__ = ["write_system"]
 
-TYPES = {kind: name for name, kind in JOINTS.items()}
+TYPES = {kind: name for name, kind in JOINTS.data.items()}  # those of other packages are not loaded
 
 
 def write_system(found: RobotSystem, folder: Path, *, t_end: float = 1.0, h: float = 1e-3) -> tuple[Path, ...]:

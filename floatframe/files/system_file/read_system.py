@@ -10,6 +10,7 @@ All of them raise `FloatframeError`, whose text is a message for the user.
 
 import logging
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -108,6 +109,9 @@ def unit_hints(system: System) -> tuple[str, ...]:
 
 log = logging.getLogger(__name__)
 
+#: tables of the objects that messages name, such as joint 'pin'
+TABLES = {"body": "bodies"} | {kind: f"{kind}s" for kind in ("joint", "coupler", "force", "element", "sensor")}
+
 
 class SystemSection(Table):
     """[system]: name, units and gravity of the system."""
@@ -151,7 +155,7 @@ class SystemFile(Table):
         coordinates = {
             f"{name}.coordinates.{key}": section
             for name, force in self.forces.items()
-            for key, section in (force.coordinates or {}).items()
+            for key, section in (getattr(force, "coordinates", None) or {}).items()
         }
         for kind, sections in (("joints", self.joints), ("forces", self.forces), ("sensors", self.sensors),
                                ("couplers", terms), ("forces", coordinates),
@@ -229,7 +233,9 @@ def read_system(
         for hint in unit_hints(system):
             log.warning("%s: %s", path, hint)
     except (FloatframeError, CmsError) as error:
-        raise SystemFileError(f"{path}: {error}") from error
+        found = re.match(rf"({'|'.join(TABLES)}) '([^']*)'", str(error))
+        line = "" if found is None else content.place((TABLES[found[1]], found[2]))
+        raise SystemFileError(f"{path}: {error}{line}") from error
     if data.run is None:
         return system, None
     coupling = None if data.cosimulation is None else data.cosimulation.coupling()

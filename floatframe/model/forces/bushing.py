@@ -5,6 +5,7 @@ Evaluated in `floatframe.engine.kernels.connections.bushing`.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
@@ -66,12 +67,10 @@ class Bushing:
     damping: GivenArray = given(np.zeros((6, 6)))
     preload: GivenArray = given(np.zeros(6))
     characteristics: Mapping[str, TimeFunction] = field(default_factory=dict, metadata=NOT_OF_TIME)
-    axes: str = "a"
+    axes: Literal["a", "b", "half way"] = "a"
 
     def __post_init__(self) -> None:
         where = f"force {self.name!r}"
-        if self.axes not in AXES:
-            raise ModelError(f"{where}: axes: expected one of {', '.join(AXES)}, got {self.axes!r}")
         for name in ("stiffness", "damping"):
             object.__setattr__(self, name, six_by_six(f"{where}: {name}", getattr(self, name)))
         object.__setattr__(self, "preload", array_of_shape(f"{where}: preload", self.preload, (6,)))
@@ -115,4 +114,6 @@ def six_by_six(where: str, values: Array) -> Array:
     """Return a (6, 6) matrix from a complete matrix or from its diagonal."""
     if np.shape(values) == (6,):
         values = np.diag(array_of_shape(where, values, (6,)))
+    if np.shape(values) != (6, 6):
+        raise ModelError(f"{where}: expected six numbers, or six rows of six numbers, got shape {np.shape(values)}")
     return array_of_shape(where, values, (6, 6))

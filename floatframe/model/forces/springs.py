@@ -11,7 +11,7 @@ from fe_models.foundation.units import SPEED, Quantity
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.checked_values import number
-from floatframe.model.functions.time_functions import NOT_OF_TIME, TimeFunction
+from floatframe.model.functions.time_functions import NOT_OF_TIME, TimeFunction, constant
 
 __all__ = ["JointForce", "SpringDamper"]
 
@@ -108,7 +108,7 @@ class JointForce:
     preload
         Constant force or torque [N, N m].
     motor
-        A function of time [N, N m].
+        A number or a function of time [N, N m].
     characteristic
         A function of x - x_0, such as a table [N, N m].
     friction
@@ -126,7 +126,7 @@ class JointForce:
     free: float = 0.0
     damping: float = 0.0
     preload: float = 0.0
-    motor: TimeFunction | None = None
+    motor: TimeFunction | float | None = None
     characteristic: TimeFunction | None = field(default=None, metadata=NOT_OF_TIME)
     friction: float = 0.0
     friction_coefficient: float = 0.0
@@ -145,6 +145,8 @@ class JointForce:
             object.__setattr__(self, name, number(f"{where}: {name}", getattr(self, name)))
         speed = number(f"{where}: friction_speed", self.friction_speed, above=0.0)
         object.__setattr__(self, "friction_speed", speed)
+        if isinstance(self.motor, int | float):
+            object.__setattr__(self, "motor", constant(number(f"{where}: motor", self.motor)))
         for name in ("motor", "characteristic"):
             if not isinstance(getattr(self, name), TimeFunction | None):
                 raise ModelError(

@@ -1,5 +1,9 @@
 """Joints, in one file for each family; `JOINTS` is the registry for the system file, `Joint` their base class."""
 
+from typing import Any
+
+from fe_models.door import Registry
+from floatframe.errors import ModelError
 from floatframe.model.joints.joint import Joint
 from floatframe.model.joints.lower_pairs import (
     CylindricalJoint,
@@ -39,20 +43,27 @@ __all__ = [
     "UniversalJoint",
 ]
 
-JOINTS = {
-    "constant-orientation": ConstantOrientation,
-    "constant-velocity": ConstantVelocityJoint,
-    "cylindrical": CylindricalJoint,
-    "distance": DistanceJoint,
-    "fixed": FixedJoint,
-    "planar": PlanarJoint,
-    "point-on-line": PointOnLine,
-    "point-on-plane": PointOnPlane,
-    "prismatic": PrismaticJoint,
-    "revolute": RevoluteJoint,
-    "rolling-disc": RollingDisc,
-    "screw": ScrewJoint,
-    "sliding": SlidingJoint,
-    "spherical": SphericalJoint,
-    "universal": UniversalJoint,
-}
+#: joint classes by the `type` of a table [joints.NAME]: those of floatframe, and of other packages by entry points
+JOINTS: Registry[Any] = Registry(
+    "floatframe.joints",
+    {
+        "constant-orientation": ConstantOrientation,
+        "constant-velocity": ConstantVelocityJoint,
+        "cylindrical": CylindricalJoint,
+        "distance": DistanceJoint,
+        "fixed": FixedJoint,
+        "planar": PlanarJoint,
+        "point-on-line": PointOnLine,
+        "point-on-plane": PointOnPlane,
+        "prismatic": PrismaticJoint,
+        "revolute": RevoluteJoint,
+        "rolling-disc": RollingDisc,
+        "screw": ScrewJoint,
+        "sliding": SlidingJoint,
+        "spherical": SphericalJoint,
+        "universal": UniversalJoint,
+    },
+    ModelError,
+    kind="a class that derives from Joint",
+    is_kind=lambda found: isinstance(found, type) and issubclass(found, Joint),
+)

@@ -116,13 +116,13 @@ def test_file_becomes_the_system_it_describes(write):
         ('type = "revolute"', 'type = "revolut"', "unknown type of joint; did you mean 'revolute'"),
         ('type = "revolute"', 'type = "hinge"', 'unknown type of joint; it is called "revolute" here'),
         ('type = "revolute"', 'type = "translational"', 'unknown type of joint; it is called "prismatic" here'),
-        ('type = "revolute"', 'type = "spherical"', "a spherical joint has no key axis"),
+        ('type = "revolute"', 'type = "spherical"', 'pin.axis: unknown key of type "spherical"; choices: body_a'),
         ('body_b = "rod"', 'body_b = "rodd"', r'pin.body_b = "rodd": there is no such body; did you mean .rod.'),
         ('marker_b = "end_b"', 'marker_b = "end_bb"', "has no interface 'end_bb'; did you mean 'end_b'"),
-        ("axis = [0, 1, 0]", "", "axis: missing; a revolute joint needs its axis"),
-        ("axis = [0, 1, 0]", "axis = [0, nan, 0]", r"joints.pin.axis .*expected three numbers"),
-        ("stiffness = 10", "stiffness = -1", "forces.spring.stiffness = -1: expected a number, 0 or more"),
-        ("force = [1, 0, 0]", "stiffness = 3", "a point-force has no key stiffness"),
+        ("axis = [0, 1, 0]", "", r"axis: missing; expected a list of numbers: Direction of .* \(line 17\)"),
+        ("axis = [0, 1, 0]", "axis = [0, nan, 0]", r"axis = \[0, nan, 0\]: expected finite numbers, .* \(line 22\)"),
+        ("stiffness = 10", "stiffness = -1", r"spring.stiffness = -1: expected a number >= 0, got -1 \(line 35\)"),
+        ("force = [1, 0, 0]", "stiffness = 3", 'push.stiffness: unknown key of type "point-force"; choices: amplitude'),
         ("t_end = 0.05", "", "run.t_end: missing; expected a number above 0, the end time"),
         ("h = 1e-3", "h = 0", "run.h = 0: expected a number above 0"),
         ("rho_inf = 0.7", "rho_inf = 1.7", "run.rho_inf = 1.7"),
@@ -241,7 +241,7 @@ pieces = [
     motion = read_system(path)[0].joints[0].motions["angle"]
     assert_allclose([motion(t) for t in (-1.0, 0.4, 1.5, 3.0)], [0.5, 0.5, 4.5, 21.5], rtol=1e-14, atol=0)
     for old, new, words in (
-        ("[0.5, 0.0, 4.0]", "[0.6, 0.0, 4.0]", "joint 'thread': motions: angle: the value jumps by 0.1 at t = 0.5"),
+        ("[0.5, 0.0, 4.0]", "[0.6, 0.0, 4.0]", "joints.thread.motions: angle: the value jumps by 0.1 at t = 0.5"),
         ("t = [0.0, 0.5, 2.0]", "t = [0.0, 0.5]", "piecewise: expected rising times and as many functions"),
         ("t = [0.0, 0.5, 2.0]", "t = [0.0, 0.5, 0.2]", "the times do not rise"),
         ("value = 0.5", "valeu = 0.5", "pieces.*valeu.*did you mean .value"),
@@ -255,8 +255,12 @@ pieces = [
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("lead = 0.2", "", "lead: missing; a screw joint needs its advance"),
-        ("lead = 0.2", "lead = 0", "lead: expected a number other than zero"),
+        ("lead = 0.2", "", "lead: missing; expected a number: Distance along the axis per turn"),
+        (
+            "lead = 0.2",
+            "lead = 0",
+            r"lead = 0: expected a number other than zero; use .* joint \(line 20\)",
+        ),
         ("omega = 4", "omgea = 4", "motions.angle.omgea: .*did you mean .omega"),
         ("omega = 4", "", "omega: missing; expected a number, the angular frequency"),
         ("omega = 4", "omega = 4\nphase = 1", "a cycloidal-spin-up motion has no key phase"),
@@ -316,11 +320,11 @@ def test_forces_in_joints_and_tables_are_read(write):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('joint = "pin"', "", "joint: missing; expected the name of a joint"),
-        ('joint = "pin"', 'joint = "pni"', "force 'motor': no joint 'pni'; did you mean 'pin'"),
+        ('joint = "pin"', "", "motor.joint: missing; expected text: Name of the joint"),
+        ('joint = "pin"', 'joint = "pni"', r"force 'motor': no joint 'pni'; did you mean 'pin'.* \(line 45\)"),
         ('coordinate = "angle"', 'coordinate = "distance"', "no coordinate 'distance' that can take a force"),
-        ("friction = 0.1", "friction = -1", "friction = -1: expected a number, 0 or more"),
-        ("damping = 0.2", "force = [1, 0, 0]", "a joint-force has no key force"),
+        ("friction = 0.1", "friction = -1", "friction = -1: expected a number >= 0"),
+        ("damping = 0.2", "force = [1, 0, 0]", 'motor.force: unknown key of type "joint-force"; did you mean .free.'),
     ],
 )
 def test_mistakes_in_joint_forces_are_answered(write, old, new, words):

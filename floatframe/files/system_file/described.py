@@ -1,0 +1,294 @@
+"""Tables of the system file that describe objects: their keys are the fields of a class, explained in its docstring.
+
+A new class with a name in a registry, such as `JOINTS`, is all that a new kind of object needs: reading, messages, the
+JSON schema and the reference page of the keys follow from the class.
+"""
+
+import inspect
+import logging
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, Field, dataclass, field, fields
+from functools import cache
+from types import NoneType, UnionType
+from typing import Annotated, Any, ClassVar, Literal, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+import pydantic
+from pydantic import ConfigDict, PlainValidator, TypeAdapter, ValidationError, ValidationInfo, create_model
+from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
+
+from fe_models.foundation.toml_file import Matrix3, Table, choice, is_no_number
+from floatframe.errors import ModelError, SignalError
+from floatframe.files.system_file.coordinate_section import CoordinateSection, NamedCoordinate, marker_of
+from floatframe.files.system_file.keys import Name
+from floatframe.files.system_file.motion_section import MotionSection
+from floatframe.files.system_file.place_key import PlaceOnBody
+from floatframe.files.system_file.signal_section import SignalFunction
+from floatframe.model.bodies.coordinates import JointCoordinateName
+from floatframe.model.bodies.markers import Marker
+from floatframe.model.functions.time_functions import TimeFunction
+
+__all__ = ["DescribedSection", "OneOf", "Signals"]
+
+log = logging.getLogger(__name__)
+
+Signals = Mapping[str, SignalFunction] | None  #: signals of a system file, by name
+
+
+class DescribedSection(Table):
+    """A table whose keys are the fields of a class."""
+
+    model_config = ConfigDict(protected_namespaces=())
+    described: ClassVar[Any]  #: the class
+
+    def object_named(self, name: str, signals: Signals = None) -> Any:
+        """Return the object of the table."""
+        given: dict[str, Any] = {}
+        for each in own_fields(self.described):
+            if is_marker(each.name, hints_of(self.described)):
+                body, place, triad = (getattr(self, key) for key in keys_of_marker(each.name))
+                may_be_body = hints_of(self.described)[each.name] is not Marker and place is None and triad is None
+                given[each.name] = body if may_be_body else marker_of(body, place, triad)
+            elif each.name in self.model_fields_set:
+                given[each.name] = python_value(getattr(self, each.name), signals)
+        return self.described(name, **given)
+
+    @pydantic.model_validator(mode="wrap")
+    @classmethod
+    def _accepted_by_the_class(cls, table: Any, handler: Any) -> Any:
+        section = handler(table)
+        try:
+            section.object_named("")
+        except SignalError:  # signals are known once the whole file is read
+            return section
+        except ModelError as error:
+            text = re.sub(r"^\w+ '': ", "", str(error))
+            key, _, reason = text.partition(": ")
+            if key not in cls.model_fields or key not in table:
+                raise ValueError(text) from None
+            problem = PydanticCustomError("value_error", "{error}", {"error": reason})
+            details = InitErrorDetails(type=problem, loc=(key,), input=table.get(key))
+            raise ValidationError.from_exception_data(key, [details]) from None
+        return section
+
+
+def python_value(value: Any, signals: Signals) -> Any:
+    """Return the value of a field from that of a key."""
+    if isinstance(value, MotionSection):
+        return value.function(signals)
+    if isinstance(value, CoordinateSection):
+        return value.found()
+    if isinstance(value, dict):
+        return {key: python_value(each, signals) for key, each in value.items()}
+    return value
+
+
+# keys of a class ------------------------------------------------------------------------------------------------------
+
+
+def own_fields(kind: Any) -> list[Field[Any]]:
+    """Return the fields of a class without its name."""
+    return [each for each in fields(kind) if each.init and each.name != "name"]
+
+
+@cache
+def hints_of(kind: Any) -> dict[str, Any]:
+    """Return the types of the fields of a class."""
+    return get_type_hints(kind)
+
+
+def is_marker(name: str, hints: Mapping[str, Any]) -> bool:
+    """Whether a field is a marker, which has keys for its body, its place and its axes."""
+    return name.startswith("marker") and Marker in (hints[name], *get_args(hints[name]))
+
+
+def keys_of_marker(name: str) -> tuple[str, str, str]:
+    """Return the keys of the marker "marker_a": "body_a", "marker_a" and "triad_a"."""
+    return name.replace("marker", "body"), name, name.replace("marker", "triad")
+
+
+def meanings_of(kind: Any) -> dict[str, str]:
+    """Return the descriptions of the fields in the docstring of a class."""
+    _, _, listed = (inspect.getdoc(kind) or "").partition("Parameters\n----------\n")
+    found = re.findall(r"^(\w.*)\n((?: +.*\n?)+)", listed.partition("\n\n")[0] + "\n", re.MULTILINE)
+    return {name: " ".join(text.split()).removesuffix(".") for names, text in found for name in names.split(", ")}
+
+
+@cache
+def section_of(name: str, kind: Any, place: str, stated: tuple[type, ...] = ()) -> type[DescribedSection]:
+    """Return the model of the tables that describe an object of a class.
+
+    Parameters
+    ----------
+    name
+        The `type` of the table.
+    kind
+        The class, a dataclass.
+    place
+        Key path of the tables, such as "joints.NAME".
+    stated
+        Fields whose default has one of these types must be stated in a file.
+    """
+    keys: dict[str, Any] = {"type": (Literal[name], pydantic.Field(description=f'"{name}"'))}
+    hints, meanings = hints_of(kind), meanings_of(kind)
+    for each in own_fields(kind):
+        if is_marker(each.name, hints):
+            body, marker, triad = keys_of_marker(each.name)
+            keys[body] = (Name, pydantic.Field(description='the name of a body, or "ground"'))
+            place_text = f"an interface, or a position [x, y, z] in {body}: {meanings.get(each.name, '')}".rstrip(": ")
+            keys[marker] = (PlaceOnBody | None, pydantic.Field(None, description=place_text))
+            axes_text = f"the axes of {marker}, [x axis, y axis, z axis]"
+            keys[triad] = (Matrix3 | None, pydantic.Field(None, description=axes_text))
+        elif (key := key_of(hints[each.name])) is not None:
+            text = ": ".join(filter(None, (key.meaning, meanings.get(each.name))))
+            default = each.default if each.default_factory is MISSING else each.default_factory()
+            if default is MISSING or isinstance(default, stated):
+                keys[each.name] = (key.type, pydantic.Field(description=text))
+            else:
+                keys[each.name] = (key.type | None, pydantic.Field(None, description=text))
+    summary = (inspect.getdoc(kind) or "").partition("\n\n")[0]
+    told = f'[{place}] of type "{name}": {summary}'
+    model = create_model(kind.__name__, __base__=DescribedSection, __doc__=told, __cls_kwargs__={"title": name}, **keys)
+    model.described = kind
+    return model
+
+
+@dataclass(frozen=True)
+class Key:
+    """The type of a value in a file, and its description."""
+
+    type: Any
+    meaning: str
+
+
+def key_of(hint: Any) -> Key | None:
+    """Return what a file gives for a field of a type; None if a file cannot give it."""
+    if hint in KEYS:
+        return KEYS[hint]
+    origin, within = get_origin(hint), get_args(hint)
+    if origin is np.ndarray:
+        return KEYS[np.ndarray]
+    if origin is Literal:
+        return Key(choice("value", lambda: within), f"one of {', '.join(map(str, within))}")
+    if origin in (Union, UnionType):
+        keys = list(dict.fromkeys(key for each in within if each is not NoneType and (key := key_of(each)) is not None))
+        return keys[0] if len(keys) == 1 else either(keys) if keys else None
+    inner = key_of(within[-1]) if isinstance(origin, type) and issubclass(origin, Mapping | Sequence) else None
+    if inner is not None:
+        held = inner.type
+        if issubclass(origin, Mapping):
+            return Key(dict[str, held], f"a table, each value of it {inner.meaning}")  # type: ignore[valid-type]
+        return Key(list[held], f"a list, each of it {inner.meaning}")  # type: ignore[valid-type]
+    return None
+
+
+def either(keys: Sequence[Key]) -> Key:
+    """Return the key of a value that has one of several types."""
+    adapters = [TypeAdapter(key.type) for key in keys]
+
+    def check(value: Any, info: ValidationInfo) -> Any:
+        problems = []
+        for adapter in adapters:
+            try:
+                return adapter.validate_python(value, strict=True, context=info.context)
+            except ValidationError as problem:
+                problems.append(problem)
+        raise max(problems, key=lambda problem: len(problem.errors()[0]["loc"]))  # that of the kind that fits best
+
+    types: Any = Union.__getitem__(tuple(key.type for key in keys))
+    return Key(
+        Annotated[Any, PlainValidator(check, json_schema_input_type=types)], " or ".join(k.meaning for k in keys)
+    )
+
+
+def numbers_of_any_shape(value: Any) -> Any:
+    """Return numbers, or lists of numbers, as an array."""
+    try:
+        if isinstance(value, str) or (not isinstance(value, list | tuple) and is_no_number(value)):
+            raise ValueError
+        return np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError("expected numbers, in lists of one length") from None
+
+
+Numbers = list[float] | list[list[float]]
+#: what a file gives for the fields of a type
+KEYS: dict[Any, Key] = {
+    float: Key(float, "a number"),
+    int: Key(int, "a whole number"),
+    bool: Key(bool, "true or false"),
+    str: Key(str, "text"),
+    TimeFunction: Key(MotionSection, "the table of a function"),
+    JointCoordinateName: Key(NamedCoordinate, '"JOINT.COORDINATE" or a table of a coordinate'),
+    np.ndarray: Key(
+        Annotated[Any, PlainValidator(numbers_of_any_shape, json_schema_input_type=Numbers)], "a list of numbers"
+    ),
+}
+
+
+class AnyTable(Table):
+    """A table with any keys."""
+
+    model_config = ConfigDict(extra="ignore")
+
+
+# one of several classes -----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class OneOf:
+    """Annotation of a table that describes an object of one of several classes, which its key `type` names.
+
+    Parameters
+    ----------
+    what
+        What the objects are, such as "joint".
+    kinds
+        Classes by the values of `type`.
+    place
+        Key path of the tables.
+    elsewhere
+        Values of `type` by their names in other programs.
+    stated
+        Fields whose default has one of these types must be stated in a file.
+    """
+
+    what: str
+    kinds: Mapping[str, Any]
+    place: str
+    elsewhere: Mapping[str, str] = field(default_factory=dict)
+    stated: tuple[type, ...] = ()
+
+    def model_of(self, value: Any) -> type[Table]:
+        """Return the model of a table; if its type is missing or unknown, a model that says so."""
+        kind = value.get("type") if isinstance(value, dict) else None
+        if isinstance(kind, str) and kind in self.kinds:
+            return section_of(kind, self.kinds[kind], self.place, self.stated)
+        typed = choice(f"type of {self.what}", lambda: tuple(self.kinds), self.elsewhere)
+        field = pydantic.Field(description=f"one of {', '.join(self.kinds)}")
+        return create_model(self.what, __base__=AnyTable, type=(typed, field))
+
+    def validated(self, value: Any, info: ValidationInfo) -> Table:
+        """Return the validated table."""
+        return self.model_of(value).model_validate(value, context=info.context)
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        """Return how a table is validated."""
+        return core_schema.with_info_plain_validator_function(self.validated)
+
+    def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> dict[str, Any]:
+        """Return the schema of a table of any type; each type has a definition of its own."""
+        schemas = []
+        for kind in self.kinds:
+            try:
+                model = self.model_of({"type": kind})
+            except ModelError as error:  # of another package, which cannot be loaded
+                log.warning("%s", error)
+                continue
+            ref, schema = f"{self.what}.{model.__name__}:{kind}", model.__pydantic_core_schema__
+            if schema["type"] != "definitions":
+                named: Any = {**schema, "ref": ref}
+                schema = core_schema.definitions_schema(core_schema.definition_reference_schema(ref), [named])
+            schemas.append(handler(schema))
+        return {"anyOf": schemas}
