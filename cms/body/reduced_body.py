@@ -16,6 +16,7 @@ from cms.errors import BodyError
 from fe_models.body.load_cases import ReducedLoadCase
 from fe_models.body.unit_check import BodyNumbers, hull_volume, implausible_numbers
 from fe_models.foundation.arrays import Array, IntArray, require_shape
+from fe_models.foundation.documents.table import Table, Tabular
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import Summary, listed, presented
 from fe_models.foundation.records import ArrayShape, FrozenMapping, checked_fields, frozen_copies
@@ -94,7 +95,7 @@ class ReducedInterface:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
-class ReducedBody:
+class ReducedBody(Tabular):
     """A body as r = c + Phi q in its frame B, with M-orthonormal, K-diagonal shapes (docs/theory.md §3-5).
 
     The unit of q follows from Phi.T M Phi = 1: sqrt(kg) m. Phi q is a length.
@@ -253,6 +254,12 @@ class ReducedBody:
             for k, (f, label) in enumerate(zip(self.frequencies, self.labels, strict=True))
         ]
         return Summary(f"ReducedBody {self.name!r}: {self.n_q} modes", rows, ("mode", "Hz", "energy from"), modes)
+
+    def to_table(self) -> Table:
+        """Return number, frequency with a fixed frame, and label of each mode, a row each."""
+        frequencies = self.frequencies / self.units.time
+        rows = zip(range(1, self.n_q + 1), frequencies.tolist(), self.labels, strict=True)
+        return Table.of_rows(("mode", "frequency", "energy from"), rows, {"frequency": "Hz"})
 
     @property
     def n_q(self) -> int:

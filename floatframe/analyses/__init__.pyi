@@ -15,7 +15,6 @@ from .driven.inverse_dynamics import drive_forces as drive_forces
 from .driven.inverse_dynamics import with_motors as with_motors
 from .element_check import ElementCheck as ElementCheck
 from .element_check import check_element as check_element
-from .equilibrium import Equilibrium as Equilibrium
 from .equilibrium import steady_rotation as steady_rotation
 from .inverse_kinematics import ReachedPose as ReachedPose
 from .inverse_kinematics import Target as Target
@@ -35,6 +34,7 @@ from .linear.state_space import NamedStateSpace as NamedStateSpace
 from .linear.state_space import named_state_space as named_state_space
 from .linear.state_space import write_state_space as write_state_space
 from .linear.system_modes import SystemModes as SystemModes
+from .snapshot import Equilibrium as Equilibrium
 from .snapshot import snapshot as snapshot
 from .steady.steady_motion import SteadyMotion as SteadyMotion
 from .steady.steady_motion import steady_motion as steady_motion

@@ -24,11 +24,10 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.presentation import presented
-from fe_models.foundation.records import checked_fields
 from floatframe.analyses.led_equilibrium import LARGEST, Balance, LoadPathEnd, is_left_by_none, led_equilibrium
 from floatframe.analyses.observed_state import observed_state
 from floatframe.analyses.relative.tree_flow import tree_flow
+from floatframe.analyses.snapshot import Equilibrium
 from floatframe.analyses.system_matrices import held_rows, turning_matrices
 from floatframe.engine.compiling.callbacks import raise_errors_of
 from floatframe.engine.compiling.file_frames import motion_of_file
@@ -68,7 +67,7 @@ from floatframe.results.validity import ValidityNote
 from floatframe.simulation.stop_events import require_off_stops
 from floatframe.simulation.validity_watch import ValidityWatch
 
-__all__ = ["Equilibrium", "static_equilibrium", "steady_rotation"]
+__all__ = ["static_equilibrium", "steady_rotation"]
 
 log = logging.getLogger(__name__)
 
@@ -89,42 +88,6 @@ CLOSED = 1e-10  #: largest constraint error of a joint, relative to the size of 
 #: number of steps in which unbalanced forces, constraint errors or changes of states must fall to half their minimum.
 #: The slowest equilibria of the tests, a free spinning body and a beam far above buckling, needed 28 and 29
 PATIENCE = 40
-
-
-@presented
-@dataclass(frozen=True, eq=False)
-@checked_fields(ModelError)
-class Equilibrium:
-    """A state in which all forces are in equilibrium.
-
-    Parameters
-    ----------
-    state
-        State with the velocities of the steady rotation, zero at rest.
-    u_dot
-        Accelerations of the steady rotation, zero at rest, (n_u,).
-    w
-        Wrenches of joints and spring-dampers on their markers A, in ground axes, (n_w,).
-    omega
-        Angular velocity of the steady rotation in ground axes, (3,) [rad/s]; zero at rest.
-    residual
-        Largest unbalanced force, relative to the acting forces.
-    n_iterations
-        Number of iterations.
-    validity
-        Notes on bodies beyond the linear range of their frame, as for a motion.
-    t
-        Time at which all functions of time are evaluated [s].
-    """
-
-    state: State
-    u_dot: Array
-    w: Array
-    omega: Array
-    residual: float
-    n_iterations: int
-    validity: tuple[ValidityNote, ...] = ()
-    t: float = 0.0
 
 
 @dataclass(eq=False)
@@ -355,7 +318,8 @@ def steady_rotation(
                 require_off_stops(system, w)
                 notes = notes_at(system, work, state, u_dot, w)
                 told_state, told_u_dot = motion_of_file(compiled, state, u_dot)
-                return Equilibrium(replace(told_state, w=w), told_u_dot, w, omega, error, iteration, notes)
+                rest = replace(told_state, w=w)
+                return Equilibrium(rest, told_u_dot, w, omega, error, iteration, notes, system=system)
             change = float(states.change.max()) if len(states.sizes) else np.inf
             has_stood = progress.has_ended(iteration, (size, float(np.abs(gaps).max(initial=0.0)), change))
             if iteration == max_iterations or has_stood:

@@ -12,10 +12,10 @@ from cms.cli.console import guarded, output_path, print_table, say, stages, vect
 from cms.cli.outputs import PICTURES, TABLES, output_file, write_outputs
 
 if TYPE_CHECKING:
-    from floatframe.analyses.equilibrium import Equilibrium
     from floatframe.analyses.linear.linearization import LinearSystem
     from floatframe.analyses.linear.parameter_study import Locus
     from floatframe.analyses.linear.system_modes import SystemModes
+    from floatframe.analyses.snapshot import Equilibrium
     from floatframe.model.system import System
     from floatframe.pictures.body_colors import BodyColor
 

@@ -8,9 +8,8 @@ import numpy as np
 from cms.assessment.rendering import Drawing, Lines, Scene, Surface, Triad, render_animation, render_picture
 from cms.assessment.rendering.drawing import OnFrame
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.analyses.equilibrium import Equilibrium
 from floatframe.analyses.linear.system_modes import SystemModes
-from floatframe.analyses.snapshot import states_as_motion
+from floatframe.analyses.snapshot import Equilibrium, states_as_motion
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.newton_equations import displaced, in_ground_axes
 from floatframe.errors import ModelError

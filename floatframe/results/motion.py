@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.documents.table import Table
+from fe_models.foundation.documents.table import Table, Tabular
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.words import nearest, quoted
@@ -34,8 +34,6 @@ from floatframe.results.trajectory import BodyMotion, Drift, Reaction, Trajector
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from pandas import DataFrame
-    from xarray import Dataset
 
 __all__ = ["JointMotion", "Motion", "MovedBody", "motion_of"]
 
@@ -44,7 +42,7 @@ __all__ = ["JointMotion", "Motion", "MovedBody", "motion_of"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class Motion(Trajectory):
+class Motion(Tabular, Trajectory):
     """A motion together with its system.
 
     Parameters
@@ -120,7 +118,8 @@ class Motion(Trajectory):
     def to_table(self, *names: str) -> Table:
         """Return the time t and measurements (see `measurements`) as a table with columns such as "tip x".
 
-        `motion.to_table("tip").write("tip.csv")` writes them, also as .json, .mat, .npz or .parquet.
+        `motion.to_table("tip").write("tip.csv")` writes them, also as .json, .mat, .npz or .parquet, and
+        `motion.to_dataframe("tip")` returns them for pandas.
         """
         chosen = self.measurements(*names)
         columns = {one.channel(name): values for one in chosen for name, values in one.columns.items()}
@@ -160,20 +159,6 @@ class Motion(Trajectory):
             return pages[page - 1]
         plot_columns(chosen, ax, time_symbol=symbol)
         return figure_of(ax)
-
-    def to_dataframe(self, *names: str) -> "DataFrame":
-        """Return a pandas DataFrame of measurements over time (see `measurements`), columns such as "tip x".
-
-        The units are in `attrs["units"]`, by column. Needs pandas (`pip install "floatframe[tables]"`).
-        """
-        return self.to_table(*names).to_dataframe("t")
-
-    def to_xarray(self, *names: str) -> "Dataset":
-        """Return an xarray Dataset of measurements over t (see `measurements`), each with its unit in `attrs`.
-
-        Needs xarray (`pip install "floatframe[tables]"`).
-        """
-        return self.to_table(*names).to_xarray("t")
 
 
 @frozen_copies

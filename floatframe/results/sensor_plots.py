@@ -1,6 +1,6 @@
 """Plots of measurements over time: panels of one unit and at most a dozen curves, pages of at most eight panels."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -20,6 +20,7 @@ __all__ = [
     "labelled",
     "pages_of",
     "panels_of",
+    "plot_bars",
     "plot_columns",
     "plot_measurement",
     "sensor_pages",
@@ -29,6 +30,7 @@ ROUNDING = 1e-9  #: magnitude, relative to the largest column of a unit, below w
 MOST_CURVES = 12  #: largest number of curves in a panel; further columns go into additional panels
 N_COLORS = 10  #: number of colours, after which they repeat with dashed lines
 LONG_LEGEND = 6  #: number of entries above which a legend has two columns
+MOST_BARS = 40  #: largest number of bars of a unit
 MOST_PANELS = 8  #: largest number of panels on a page
 LEGEND_GAP = 0.03  #: gap between curves and a legend above them, as a share of the height of a panel
 MOST_LEGEND = 0.5  #: largest share of the height of a panel that is kept free for a legend
@@ -123,6 +125,50 @@ def sensor_pages(measurements: Sequence[Measurement], *, title: str = "", time_s
     if not panels:
         raise ResultsError("plot: no sensor to plot; name a joint coordinate, or add tables [sensors.NAME]")
     return pages_of(panels, title=title)
+
+
+def plot_bars(measurements: Sequence[Measurement], *, title: str = "") -> "Figure":
+    """Return a figure with the last values of all columns as bars, a panel for each unit.
+
+    Columns that are zero are left out, unless all of their unit are zero; so are the smallest beyond `MOST_BARS`.
+
+    Raises
+    ------
+    ResultsError
+        If there is nothing to plot.
+    """
+    from matplotlib.figure import Figure
+
+    bars: dict[str, dict[str, float]] = {}
+    for each in measurements:
+        for name, values in each.quantities.items():
+            label = each.sensor if len(each.quantities) == 1 else each.channel(name)
+            bars.setdefault(each.units[name], {})[label] = float(values[-1])
+    if not bars:
+        raise ResultsError("plot: no sensor to plot; name a joint coordinate, or add tables [sensors.NAME]")
+    shown = {unit: largest_bars(values) for unit, values in bars.items()}
+    heights = [0.28 * len(values) + 1.0 for values in shown.values()]
+    figure = Figure(figsize=(7, sum(heights) + 0.4), layout="constrained")
+    figure.suptitle(title)
+    axes = figure.subplots(len(shown), 1, squeeze=False, height_ratios=heights).ravel()
+    for ax, (unit, drawn) in zip(axes, shown.items(), strict=True):
+        patches = ax.barh(list(drawn), list(drawn.values()), color="C0")
+        ax.bar_label(patches, [f"{value:.4g}" for value in drawn.values()], padding=3, fontsize="small")
+        ax.margins(x=0.15)
+        ax.invert_yaxis()
+        ax.axvline(0.0, color="k", linewidth=0.8)
+        left_out = len(bars[unit]) - len(drawn)
+        ax.set_xlabel(f"[{unit}]" + (f", {left_out} smaller left out" if left_out else ""))
+        ax.grid(axis="x", alpha=0.3)
+    return figure
+
+
+def largest_bars(values: Mapping[str, float]) -> dict[str, float]:
+    """Return the largest values, in their order, without rounding errors; the first one if all are zero."""
+    size = max(map(abs, values.values()))
+    ranked = sorted(values, key=lambda name: -abs(values[name]))[:MOST_BARS]
+    kept = [name for name in values if name in ranked and abs(values[name]) > ROUNDING * size]
+    return {name: values[name] for name in kept or list(values)[:1]}
 
 
 def pages_of(panels: "Sequence[Callable[[Axes], Axes]]", *, title: str = "") -> list["Figure"]:

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from cms.assessment.quality.record import QualityRecord
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.documents.table import Table
+from fe_models.foundation.documents.table import Table, Tabular
 from fe_models.foundation.units import Units
 
 __all__ = ["Comparison", "Drawing", "FullResults", "Point", "SetResult"]
@@ -85,7 +85,7 @@ class Drawing:
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class Comparison(Tabular):
     """Comparison of mode sets of one body with its full model."""
 
     name: str  #: name of the body
@@ -107,6 +107,8 @@ class Comparison:
             if result.name == name:
                 return result
         raise KeyError(name)
+
+    is_indexed = False
 
     def to_table(self) -> Table:
         """Return the values of all records, one row for every set and number of modes; non-finite values are missing.

@@ -14,6 +14,7 @@ from cms.assessment.correlation.points import Placement, PointPairs, pair_points
 from cms.assessment.quality.of_reduction.frequencies import mac
 from cms.assessment.quality.record import plain
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.documents.table import Table, Tabular
 
 __all__ = [
     "Correlation",
@@ -155,7 +156,7 @@ class Pairing:
 
 
 @dataclass(frozen=True, eq=False)
-class Correlation:
+class Correlation(Tabular):
     """Comparison of a test and a model."""
 
     measured: MeasuredModes
@@ -180,6 +181,20 @@ class Correlation:
     def shapes(self) -> Array:
         """Computed shapes at the measured rows, (n_rows, n_m)."""
         return at_rows(self.model, self.points.rows, self.points.directions)
+
+    def to_table(self) -> Table:
+        """Return measured and computed frequency, their relative error and the MAC, one row for each measured mode."""
+        partner = {pair.measured: (pair, error) for pair, error in zip(self.pairs, self.errors, strict=True)}
+        rows: list[tuple[Any, ...]] = []
+        for k, frequency in enumerate(self.measured.frequencies.tolist()):
+            if k not in partner:
+                rows.append((k + 1, frequency, None, None, None, None))
+                continue
+            pair, error = partner[k]
+            computed = float(self.model.frequencies[pair.computed])
+            rows.append((k + 1, frequency, pair.computed + 1, computed, float(error), pair.mac))
+        names = ("measured", "measured frequency", "computed", "computed frequency", "error", "MAC")
+        return Table.of_rows(names, rows, {"measured frequency": "Hz", "computed frequency": "Hz"})
 
     def point_comac(self) -> list[tuple[int, str, float]]:
         """Return point, node and the smallest COMAC over the directions, worst point first."""

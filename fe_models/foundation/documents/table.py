@@ -18,7 +18,7 @@ import zipfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from rich.table import Table as RichTable
     from xarray import Dataset
 
-__all__ = ["Table", "read_table"]
+__all__ = ["Table", "Tabular", "read_table"]
 
 Column = NDArray[Any]
 
@@ -219,6 +219,35 @@ class Table:
         if self.n_rows > MOST_SHOWN:
             shown.caption = f"... and {self.n_rows - MOST_SHOWN} more rows"
         return shown
+
+
+class Tabular:
+    """A result that can be a table: `to_table`, and the same table for pandas and xarray.
+
+    Classes that derive from it have the method `to_table`.
+    """
+
+    is_indexed: ClassVar[bool] = True  #: whether the first column is the index
+
+    def to_table(self, *given: Any, **options: Any) -> Table:
+        """Return the result as a table with units."""
+        raise NotImplementedError
+
+    def to_dataframe(self, *given: Any, **options: Any) -> "DataFrame":
+        """Return the table of `to_table`, with the same arguments, as a pandas DataFrame, units in `attrs["units"]`.
+
+        Needs pandas (`pip install "floatframe[tables]"`).
+        """
+        table = self.to_table(*given, **options)
+        return table.to_dataframe(table.names[0] if self.is_indexed else None)
+
+    def to_xarray(self, *given: Any, **options: Any) -> "Dataset":
+        """Return the table of `to_table`, with the same arguments, as an xarray Dataset, the unit of each in `attrs`.
+
+        Needs xarray (`pip install "floatframe[tables]"`).
+        """
+        table = self.to_table(*given, **options)
+        return table.to_xarray(table.names[0] if self.is_indexed else None)
 
 
 def column_of(name: str, values: ArrayLike) -> Column:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.documents.table import Table
+from fe_models.foundation.documents.table import Table, Tabular
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from floatframe.analyses.linear.linearization import LinearSystem
@@ -31,7 +31,7 @@ LEAST_DAMPING = 1e-4  #: smallest damping ratio for the width of a resonance, be
 @presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class FrequencyResponse:
+class FrequencyResponse(Tabular):
     """Frequency responses y/s.
 
     Parameters

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import Takes, checked_fields
-from floatframe.analyses.equilibrium import Equilibrium, static_equilibrium
+from floatframe.analyses.equilibrium import static_equilibrium
 from floatframe.analyses.linear.channels import (
     AnyInput,
     AnyOutput,
@@ -49,7 +49,7 @@ from floatframe.analyses.linear.inputs import (
     interface_forces,
 )
 from floatframe.analyses.relative.coordinate_basis import MODE, coordinate_basis, dependent_coordinates
-from floatframe.analyses.snapshot import snapshot
+from floatframe.analyses.snapshot import Equilibrium, snapshot
 from floatframe.analyses.steady.steadiness import require_steady
 from floatframe.analyses.system_matrices import ROUNDING, Inputs, Tangents, settled, tangents, turning_matrices
 from floatframe.engine.compiling.file_frames import motion_of_engine, small_motions_of_file

@@ -9,14 +9,14 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.documents.table import Table
+from fe_models.foundation.documents.table import Table, Tabular
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
-from floatframe.analyses.equilibrium import Equilibrium, steady_rotation
+from floatframe.analyses.equilibrium import steady_rotation
 from floatframe.analyses.linear.channels import AnyOutput, named_output, outputs_of
 from floatframe.analyses.linear.linearization import LinearSystem, linearize
 from floatframe.analyses.linear.system_modes import system_modes
-from floatframe.analyses.snapshot import snapshot
+from floatframe.analyses.snapshot import Equilibrium, snapshot
 from floatframe.analyses.steady.turning_drives import turning_with
 from floatframe.errors import ConvergenceError, ModelError
 from floatframe.model.checked_values import array_of_shape, unit_vector
@@ -36,7 +36,7 @@ MOST_HALVINGS = 3  #: largest number of times that a parameter step is halved if
 @presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class Locus:
+class Locus(Tabular):
     """Eigenvalues as functions of a parameter; each column follows one mode.
 
     Parameters

@@ -1,17 +1,23 @@
 """Vibration modes of the whole system: complex eigenvalues, frequencies, damping ratios and shapes."""
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.documents.table import Table
+from fe_models.foundation.documents.table import Table, Tabular
 from fe_models.foundation.presentation import Summary, presented
 from fe_models.foundation.records import checked_fields
 from floatframe.analyses.linear.linearization import LinearSystem
 from floatframe.analyses.system_matrices import ROUNDING
 from floatframe.errors import ModelError
+from floatframe.results.sensor_plots import figure_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 __all__ = ["SystemModes", "system_modes"]
 
@@ -26,7 +32,7 @@ LEAST_BODY_MOTION = 1e-9
 @presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class SystemModes:
+class SystemModes(Tabular):
     """Modes exp(lambda t) in ascending |lambda|; one mode represents each conjugate pair.
 
     A motion without resistance is listed as one mode with lambda = 0, although it has two eigenvalues, one for its
@@ -84,6 +90,37 @@ class SystemModes:
             **{f"energy {name}": share for name, share in zip(self.bodies, self.energy_shares.T, strict=True)},
         }
         return Table(columns, {"frequency": "Hz", "natural frequency": "Hz", "growth": "1/s"})
+
+    def plot(self, *, ax: "Axes | None" = None, time_unit: float = 1.0) -> "Figure":
+        """Draw the eigenvalues: growth along x, damped frequency along y, with the number of each mode.
+
+        Growing modes, right of the line, are red.
+
+        Parameters
+        ----------
+        ax
+            Axes of a figure; None: a new figure.
+        time_unit
+            Unit of time of the system [s].
+        """
+        from matplotlib.figure import Figure
+
+        axes = ax or Figure(figsize=(7, 5), layout="constrained").add_subplot()
+        growth, hertz = self.eigenvalues.real / time_unit, self.frequencies / time_unit
+        limits = self.errors / time_unit if len(self.errors) else np.zeros(len(growth))
+        colors = ["C3" if x > limit else "C0" for x, limit in zip(growth, limits, strict=True)]
+        axes.scatter(growth, hertz, c=colors, marker="x", zorder=3)
+        places: dict[tuple[float, float], list[int]] = {}
+        for k, place in enumerate(zip(growth.tolist(), hertz.tolist(), strict=True)):
+            places.setdefault(place, []).append(k + 1)
+        for place, numbers in places.items():  # equal eigenvalues share a label
+            words = ", ".join(map(str, numbers[:3])) + (", ..." if len(numbers) > 3 else "")
+            axes.annotate(words, place, xytext=(5, 3), textcoords="offset points", fontsize="small")
+        axes.axvline(0.0, color="k", linewidth=0.8)
+        axes.set_xlabel("growth [1/s]")
+        axes.set_ylabel("frequency [Hz]")
+        axes.grid(alpha=0.3)
+        return figure_of(axes)
 
     @property
     def moves_most(self) -> tuple[str, ...]:

@@ -16,7 +16,8 @@ import scipy.linalg as la
 from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array
-from floatframe.analyses.equilibrium import Equilibrium, forces_at_work, size_of, worst_body
+from floatframe.analyses.equilibrium import forces_at_work, size_of, worst_body
+from floatframe.analyses.snapshot import Equilibrium
 from floatframe.analyses.steady.carrier import Carrier, moved_on, turned_axes
 from floatframe.analyses.system_matrices import Tangents, rows_of_states, tangents, turning_matrices
 from floatframe.engine.compiling.file_frames import motion_of_engine

@@ -571,7 +571,7 @@ class Search:
         told, told_u_dot = motion_of_file(compiled, state, u_dot)
         about = Equilibrium(
             replace(told, w=trial.w), told_u_dot, trial.w, trial.carrier.omega, here.now.error, iteration, notes,
-            equations.t,
+            equations.t, here.system,
         )  # fmt: skip
         names = [compiled.body_names[spin.body] for spin in equations.spins]
         return SteadyMotion(

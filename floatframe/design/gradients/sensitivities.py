@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen
-from fe_models.foundation.documents.table import Table
+from fe_models.foundation.documents.table import Table, Tabular
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import nearest, quoted
@@ -74,7 +74,7 @@ SLOPE_STEP = 2e-4  #: step of differences of sensors, relative to the magnitude 
 @presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class Sensitivities:
+class Sensitivities(Tabular):
     """Values of outputs and their derivatives by parameters.
 
     Parameters
@@ -114,6 +114,8 @@ class Sensitivities:
             if name not in choices:
                 raise ModelError(f"sensitivities: there is no {quoted(name)}{nearest(name, choices)}")
         return float(self.gradient[self.outputs.index(output), self.parameters.index(parameter)])
+
+    is_indexed = False
 
     def to_table(self) -> Table:
         """Return one row per output and parameter."""

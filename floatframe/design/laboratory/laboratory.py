@@ -30,7 +30,7 @@ from cms.pipeline import Plan, reduced, states_of_job
 from cms.reduction.geometric_stiffness.unit_states import UnitStates, require_geometric_stiffness
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.documents.table import Table
+from fe_models.foundation.documents.table import Table, Tabular
 from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
@@ -122,7 +122,7 @@ class CaseResult:
 @presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class LaboratoryResult:
+class LaboratoryResult(Tabular):
     """All cases, compared with the reference.
 
     Parameters
@@ -144,6 +144,8 @@ class LaboratoryResult:
     columns: tuple[str, ...]
     cases: tuple[CaseResult, ...]
     settled: float | None = None
+
+    is_indexed = False
 
     def to_table(self) -> Table:
         """Return one row per case."""

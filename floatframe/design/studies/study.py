@@ -14,7 +14,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.digest import file_digest
-from fe_models.foundation.documents.table import Table
+from fe_models.foundation.documents.table import Table, Tabular
 from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.tasks.campaign import Campaign, campaign_digest, open_task_journal
 from fe_models.foundation.tasks.workers import Workers
@@ -77,7 +77,7 @@ EXTREMES: dict[str, Callable[[Array], float]] = {"least": np.nanmin, "greatest":
 
 
 @dataclass(frozen=True)
-class StudyTable:
+class StudyTable(Tabular):
     """All points of a study, in order."""
 
     study: Study
@@ -93,6 +93,8 @@ class StudyTable:
     def n_failed(self) -> int:
         """Number of failed points."""
         return sum(bool(row.error) for row in self.rows)
+
+    is_indexed = False
 
     def to_table(self) -> Table:
         """Return parameters, outputs and the reason of a failure by point; outputs of failed points are missing."""

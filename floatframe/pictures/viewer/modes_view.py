@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.analyses.equilibrium import Equilibrium
 from floatframe.analyses.linear.system_modes import SystemModes
-from floatframe.analyses.snapshot import snapshot
+from floatframe.analyses.snapshot import Equilibrium, snapshot
 from floatframe.errors import ResultsError
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.system import System

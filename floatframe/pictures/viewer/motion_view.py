@@ -19,8 +19,7 @@ from fe_models.foundation.documents.html import asset as document_asset
 from fe_models.foundation.documents.html import text
 from fe_models.foundation.paths import replace_file
 from fe_models.foundation.units import Units
-from floatframe.analyses.equilibrium import Equilibrium
-from floatframe.analyses.snapshot import snapshot
+from floatframe.analyses.snapshot import Equilibrium, snapshot
 from floatframe.errors import ResultsError
 from floatframe.files.system_file.recorded_system import recorded_system
 from floatframe.model.bodies.flexible_body import FlexibleBody

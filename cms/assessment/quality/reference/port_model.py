@@ -1,6 +1,6 @@
 """Modes of a body at its ports, and its frequency response."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -9,6 +9,8 @@ from cms.assessment.quality.errors import QualityError
 from cms.assessment.quality.reference.free_pencil import free_elastic_modes, free_pencil, port_rows
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import MOTION_COMPONENTS, Array, frozen
+from fe_models.foundation.documents.table import Table, Tabular
+from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = [
@@ -34,7 +36,7 @@ class PortModel:
 
 
 @dataclass(frozen=True, eq=False)
-class FrequencyResponse:
+class FrequencyResponse(Tabular):
     """Receptance between ports: displacement / force, rotation / moment, in units and axes of the mesh of the body."""
 
     frequencies: Array  #: frequencies, (n_f,) [Hz]
@@ -43,6 +45,7 @@ class FrequencyResponse:
     inputs: tuple[str, ...]  #: names of the forces, such as "big_end ux"
     damping: str  #: description of the damping
     time: float = 1.0  #: time unit of the body [s]
+    units: Units | None = None  #: units of the body, for tables; None: tables have no units of length and force
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "frequencies", frozen(self.frequencies))
@@ -78,7 +81,26 @@ class FrequencyResponse:
             tuple(self.inputs[k] for k in columns),
             self.damping,
             self.time,
+            self.units,
         )
+
+    def to_table(self) -> Table:
+        """Return the frequency, and the complex receptance of every motion and force: "right uy / left uy"."""
+        columns: dict[str, np.ndarray] = {"frequency": self.frequencies}
+        units = {"frequency": "Hz"}
+        for o, output in enumerate(self.outputs):
+            for i, given in enumerate(self.inputs):
+                columns[f"{output} / {given}"] = self.H[:, o, i]
+                if self.units is not None:
+                    units[f"{output} / {given}"] = receptance_unit(self.units, output, given)
+        return Table(columns, units)
+
+
+def receptance_unit(units: Units, motion: str, force: str) -> str:
+    """Return the unit of a motion such as "right uy" per force or moment such as "left ry"."""
+    top = units.length_symbol if motion.rsplit(" ", 1)[-1] in MOTION_COMPONENTS[:3] else "rad"
+    is_force = force.rsplit(" ", 1)[-1] in MOTION_COMPONENTS[:3]
+    return f"{top}/{units.force_symbol}" if is_force else f"{top}/({units.force_symbol} {units.length_symbol})"
 
 
 def port_model(reduced: ReducedBody) -> PortModel:
@@ -179,7 +201,8 @@ def frf(reduced: ReducedBody, frequencies: ArrayLike, *, damping: float | None =
     time = reduced.units.time
     frequencies = np.asarray(frequencies, dtype=float)
     if damping is not None:
-        return modal_response(port_model(reduced), frequencies, damping=damping, time=time)
+        found = modal_response(port_model(reduced), frequencies, damping=damping, time=time)
+        return replace(found, units=reduced.units)
     require_frequencies(frequencies)
     pencil, rows = free_pencil(reduced), mesh_port_rows(reduced)
     omega = 2 * np.pi * time * np.asarray(frequencies, dtype=float)
@@ -192,7 +215,7 @@ def frf(reduced: ReducedBody, frequencies: ArrayLike, *, damping: float | None =
         H[first : first + step] = rows @ np.linalg.solve(A, np.broadcast_to(rows.T, (len(w), *rows.T.shape)))
     labels = tuple(f"{i.name} {component}" for i in reduced.interfaces for component in MOTION_COMPONENTS)
     words = "the damping of the file" if reduced.D.any() else "no damping"
-    return FrequencyResponse(np.asarray(frequencies, dtype=float), H, labels, labels, words, time)
+    return FrequencyResponse(np.asarray(frequencies, dtype=float), H, labels, labels, words, time, reduced.units)
 
 
 def require_damping(damping: float) -> None:

@@ -13,10 +13,11 @@ import scipy.linalg as la
 
 from fe_models.foundation.arrays import STRESS_COMPONENTS, Array
 from fe_models.foundation.words import nearest, quoted
-from floatframe.analyses.equilibrium import Equilibrium, static_equilibrium
+from floatframe.analyses.equilibrium import static_equilibrium
 from floatframe.analyses.linear.channels import Column
 from floatframe.analyses.linear.inputs import BaseMotion
 from floatframe.analyses.linear.linearization import LinearSystem, linearize
+from floatframe.analyses.snapshot import Equilibrium
 from floatframe.durability.shaking.structure.body import force_outputs, unit_of
 from floatframe.durability.shaking.structure.damping import Damping
 from floatframe.durability.shaking.structure.model import DIRECTIONS, Base, Output, ShakenModel, rigid_rows

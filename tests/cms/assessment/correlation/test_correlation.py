@@ -104,6 +104,20 @@ def test_modes_of_a_stiffer_and_lighter_bar(measured, model):
     assert found.points.distances.max() < 1e-9
 
 
+def test_a_correlation_is_a_table_of_measured_modes(measured, model):
+    """The second mode has no partner; the others have their frequencies, errors and MAC."""
+    found = correlate_modes(measured, model)
+    less = replace(found, pairs=tuple(pair for pair in found.pairs if pair.measured != 1))
+    frame = less.to_dataframe()
+    assert frame.index.tolist() == list(range(1, N + 1))
+    assert frame.loc[2, ["computed", "computed frequency", "error", "MAC"]].isna().all()
+    paired = frame.drop(index=2)
+    assert_allclose(paired["computed frequency"] / paired["measured frequency"] - 1, paired["error"], atol=1e-12)
+    assert_allclose(paired["error"], less.errors)
+    assert_allclose(paired["MAC"], [pair.mac for pair in less.pairs])
+    assert less.to_xarray()["computed frequency"].attrs["units"] == "Hz"
+
+
 def test_a_turned_sensor_has_the_worst_comac(measured, model, rows):
     shapes = np.array(measured.shapes)
     k = len(rows) // 3

@@ -9,7 +9,8 @@ import cms
 import fe_models as fm
 from floatframe import FixedJoint, FlexibleBody, GeneralizedAlpha, Marker, System, integrate, linearize, system_modes
 from floatframe.analyses import steady_rotation
-from floatframe.analyses.equilibrium import Equilibrium, turning
+from floatframe.analyses.equilibrium import turning
+from floatframe.analyses.snapshot import Equilibrium
 from floatframe.components.mechanisms import rotating_blade, spin_up_beam, spinning_shaft
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.model.functions.time_functions import cycloidal_spin_up, smooth_step
