@@ -1,4 +1,4 @@
-"""A package of its own adds a mode set, an element, a joint and a reader by entry points, without an edit here."""
+"""A package of its own adds mode sets, elements, joints, sensors and readers by entry points, without an edit here."""
 
 import subprocess
 import sys
@@ -21,6 +21,7 @@ from fe_models.meshes.cells.raw_mesh import RawBlock, RawMesh
 from floatframe import Marker
 from floatframe.joints import ScrewJoint
 from floatframe.model import Element, ElementLaw
+from floatframe.results.sensors import Measurement, PlaceSensor
 
 
 def static(body):
@@ -71,6 +72,22 @@ class Bolt(ScrewJoint):
     def __post_init__(self):
         object.__setattr__(self, "lead", self.pitch * self.starts)
         super().__post_init__()
+
+
+@dataclass(frozen=True, eq=False)
+class Height:
+    """Height of a marker over a floor."""
+
+    name: str
+    marker: Marker
+    floor: float = 0.0
+
+    def measure(self, system, trajectory):
+        found = PlaceSensor("", self.marker).measure(system, trajectory)
+        return Measurement(self.name, found.t, {"height": found.columns["z"] - self.floor}, {"height": "m"})
+
+    def linear(self, small):
+        return PlaceSensor("", self.marker).linear(small)
 '''
 
 POINTS = """
@@ -88,6 +105,10 @@ acme.number = acme_fe:np
 acme.bolt = acme_fe:Bolt
 revolute = acme_fe:Bolt
 acme.broken = acme_fe.nowhere:missing
+
+[floatframe.sensors]
+acme.height = acme_fe:Height
+acme.number = acme_fe:np
 
 [fe_models.readers]
 plain = acme_fe:read_plain
@@ -131,6 +152,11 @@ starts = 2
 type = "acme.push"
 marker = {body = "block"}
 force = 3.0
+[sensors.height]
+type = "acme.height"
+body = "block"
+marker = [0, 0, 2]
+floor = 0.5
 [run]
 t_end = 1.0
 h = 0.01
@@ -138,6 +164,9 @@ h = 0.01
 system, run = ff.read_system("push.toml")
 motion = ff.integrate(system, run.integrator, run.t_end, run.h)
 np.testing.assert_allclose(motion.body("block").r[-1, 2], 0.75 / (1 + (2 * np.pi / 0.5) ** 2 / 2), rtol=1e-6)
+
+height = motion.sensor("height")["height"]
+np.testing.assert_allclose(height, motion.body("block").r[:, 2] + 1.5, rtol=0, atol=1e-12)
 
 text = pathlib.Path("push.toml").read_text()
 def changed(old, new):
@@ -155,6 +184,7 @@ for call, error in (
     (lambda: changed("starts = 2", "start = 2"), ff.errors.SystemFileError),
     (lambda: changed("acme.bolt", "acme.blt"), ff.errors.SystemFileError),
     (lambda: changed("acme.bolt", "acme.broken"), ff.errors.SystemFileError),
+    (lambda: changed("acme.height", "acme.number"), ff.errors.SystemFileError),
     (lambda: fe_models.read_mesh(pathlib.Path("one.plain").rename("one.broken")), fe_models.errors.MeshError),
 ):
     try:
@@ -175,13 +205,13 @@ def folder(tmp_path):
     return tmp_path
 
 
-def test_a_package_adds_a_mode_set_an_element_a_joint_and_a_reader(folder, monkeypatch):
+def test_a_package_adds_a_mode_set_an_element_a_joint_a_sensor_and_a_reader(folder, monkeypatch):
     """Used in Python and in files; what cannot be loaded is told with the name of its package, when it is used."""
     monkeypatch.setenv("PYTHONPATH", f"{folder}:{ROOT}")
     done = subprocess.run([sys.executable, "-c", USE], cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     *own, last = done.stdout.splitlines()
-    modes, element, number, key, kind, joint = own
+    modes, element, number, key, kind, joint, sensor = own
     assert "cms.mode_sets 'broken' of package acme-fe 1.2: " in modes
     assert "ModuleNotFoundError: No module named 'acme_fe.nowhere'" in modes
     assert "floatframe.elements 'acme.broken' of package acme-fe 1.2: " in element
@@ -190,6 +220,8 @@ def test_a_package_adds_a_mode_set_an_element_a_joint_and_a_reader(folder, monke
     assert "joints.bolt.start: unknown key of type \"acme.bolt\"; did you mean 'starts'?" in key
     assert "unknown type of joint; did you mean 'acme.bolt'?" in kind
     assert "joints.bolt: floatframe.joints 'acme.broken' of package acme-fe 1.2: " in joint
+    assert "sensors.height: floatframe.sensors 'acme.number' of package acme-fe 1.2: " in sensor
+    assert "expected a dataclass with the methods measure and linear" in sensor
     assert "fe_models.readers '.broken' of package acme-fe 1.2: " in last
     for group, name in (("cms.mode_sets", "rubin"), ("floatframe.joints", "revolute")):
         assert f"{group} '{name}' of package acme-fe 1.2: left out, this project has it" in done.stderr

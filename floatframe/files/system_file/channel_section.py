@@ -1,14 +1,13 @@
 """Tables of the system file for inputs, [inputs.NAME], and outputs, [outputs.NAME], of the linearised system."""
 
 from collections.abc import Sequence
-from dataclasses import MISSING, fields, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.foundation.arrays import STRESS_COMPONENTS
 from fe_models.foundation.toml_file import Table, Vector3, choice
 from fe_models.foundation.words import nearest, quoted
@@ -17,35 +16,17 @@ from floatframe.analyses.linear.force_inputs import ForceInput
 from floatframe.analyses.linear.inputs import BaseMotion, DriveMotion, ParameterInput
 from floatframe.errors import ModelError
 from floatframe.files.system_file.coordinate_section import of_joint
+from floatframe.files.system_file.described import DescribedSection, OneOf
 from floatframe.files.system_file.keys import Name, Number, Positive
-from floatframe.files.system_file.place_key import (
-    TOLERANCE_WORDS,
-    MeasuredPlace,
-    MeshNumber,
-    NodeOrPosition,
-    address_at,
-    marker_at,
-)
-from floatframe.model.bodies.markers import Marker
-from floatframe.results.sensors import (
-    SENSORS,
-    AngleSensor,
-    DisplacementSensor,
-    ElongationSensor,
-    PlaceSensor,
-    Sensor,
-)
-from floatframe.results.sensors.body_loads import INTERFACE_AXES
+from floatframe.files.system_file.place_key import MeasuredPlace, marker_of
+from floatframe.results.sensors import SENSORS, Sensor
 from floatframe.results.sensors.channels import QUANTITIES, RATES, Channel, StressChannel
 from floatframe.results.sensors.joint_coordinate import JointCoordinate
-from floatframe.results.sensors.loads import AXES
 from floatframe.results.sensors.measurement import owner_and_column
-from floatframe.results.sensors.places import PLACE_QUANTITIES
 from floatframe.simulation.events import DIRECTIONS, Event
 from floatframe.simulation.foreign_units import SCHEMES, Coupling, ForeignUnit
 
 __all__ = [
-    "SENSOR_TYPES",
     "CosimulationSection",
     "EventSection",
     "FmuSection",
@@ -59,118 +40,8 @@ __all__ = [
 # tables of the system file for sensors: [sensors.NAME] ----------------------------------------------------------------
 
 
-MESH = ("node", "element", "set")  #: keys that specify a place in the user's mesh
-AT = ("marker", *MESH, "tolerance")  #: keys of a place
-
-#: keys of the tables that differ from the fields of the sensor; those before "|" are required
-KEYS: dict[type[Sensor], tuple[str, ...]] = {
-    PlaceSensor: ("body", "|", *AT, "relative_to", "relative_marker"),
-    AngleSensor: ("body_a", "body_b", "|", "marker_a", "marker_b", "axis"),
-    DisplacementSensor: ("body", "|", *AT),
-    ElongationSensor: ("body", "position_a", "position_b", "|", "tolerance"),
-    JointCoordinate: ("joint", "coordinate", "|"),
-}
-
-
-def keys_of(kind: type[Sensor]) -> tuple[str, ...]:
-    """Return the keys of the table of a sensor: the fields of its class but the name; those before "|" are required."""
-    if kind in KEYS:
-        return KEYS[kind]
-    given = [each for each in fields(kind) if each.name != "name"]
-    needed = [each.name for each in given if each.default is MISSING and each.default_factory is MISSING]
-    return (*needed, "|", *(each.name for each in given if each.name not in needed))
-
-
-SENSOR_TYPES = {name: keys_of(kind) for name, kind in SENSORS.items()}
-
-
-class SensorSection(Table):
-    """[sensors.NAME]: a quantity measured on a motion."""
-
-    type: choice("type of sensor", lambda: tuple(SENSOR_TYPES)) = Field(  # type: ignore[valid-type]
-        description=f"one of {', '.join(SENSOR_TYPES)}"
-    )
-    body: str | None = Field(None, description='the name of a body, or "ground"')
-    marker: MeasuredPlace | None = Field(None, description="an interface, or a position [x, y, z] in the body")
-    node: MeshNumber | None = Field(None, description="the number of a kept node in the mesh of the body")
-    element: MeshNumber | None = Field(None, description="the number of an element on the surface of its mesh")
-    set: str | None = Field(None, description="the name of a set of its mesh")
-    tolerance: float | None = Field(None, ge=0, description=TOLERANCE_WORDS)
-    relative_to: str | None = Field(None, description="the name of the body relative to which it is measured")
-    relative_marker: MeasuredPlace | None = Field(None, description="an interface of, or a position in that body")
-    body_a: str | None = Field(None, description='the name of a body, or "ground"')
-    body_b: str | None = Field(None, description='the name of a body, or "ground"')
-    marker_a: MeasuredPlace | None = Field(None, description="an interface, or a position [x, y, z] in body_a")
-    marker_b: MeasuredPlace | None = Field(None, description="an interface, or a position [x, y, z] in body_b")
-    axis: Vector3 | None = Field(None, description="an axis in the axes of marker_a, [x, y, z]; default: z")
-    joint: str | None = Field(None, description="the name of a joint")
-    coordinate: str | None = Field(None, description="a coordinate of the joint")
-    of: str | None = Field(None, description="the name of a joint, spring, bushing, coupler, user force or element")
-    output: str | None = Field(None, description="the name of an output, state or multiplier of the element")
-    interface: str | None = Field(None, description="the name of an interface of the body")
-    table: str | None = Field(None, description="the name of a recovery table of the modal file")
-    rows: list[str] | None = Field(None, description="labels of rows, or their beginnings; default: all")
-    axes: choice("kind of axes", lambda: (*AXES, "body")) | None = Field(  # type: ignore[valid-type]
-        None, description=f"one of {', '.join(AXES)}; of an interface force {', '.join(INTERFACE_AXES)}"
-    )
-    mode: int | None = Field(None, description="a whole number, the mode, from 1")
-    position: Vector3 | None = Field(None, description="a position in the body, [x, y, z]: the node there")
-    point: str | None = Field(None, description="the name of a stress point of the modal file")
-    position_a: NodeOrPosition | None = Field(None, description="a position in the body, [x, y, z], or {node = 12}")
-    position_b: NodeOrPosition | None = Field(None, description="a position in the body, [x, y, z], or {node = 12}")
-    direction: Vector3 | None = Field(None, description="the direction of the gauge in the body, [x, y, z]")
-    young: float | None = Field(None, description="a number above 0, Young's modulus")
-    poisson: float | None = Field(None, description="a number, Poisson's ratio")
-
-    @model_validator(mode="after")
-    def _fits_the_type(self) -> "SensorSection":
-        keys = SENSOR_TYPES[self.type]
-        allowed, needed = [key for key in keys if key != "|"], keys[: keys.index("|")]
-        for key in type(self).model_fields:
-            if key != "type" and getattr(self, key) is not None and key not in allowed:
-                raise ValueError(f"a sensor of type {self.type} has no key {key}{nearest(key, allowed)}")
-        for key in needed:
-            if getattr(self, key) is None:
-                raise ValueError(f"{key}: missing; expected {type(self).model_fields[key].description}")
-        given = [key for key in ("marker", "position", "point", *MESH) if getattr(self, key) is not None]
-        if len(given) > 1:
-            raise ValueError(f"expected one place, got {' and '.join(given)}")
-        if self.type in ("stress", "strain") and not given:
-            raise ValueError("expected either position or point, or node, element or set: where it is measured")
-        if self.type == "displacement" and not given:
-            raise ValueError("marker: missing; expected an interface, a position, or node, element or set")
-        return self
-
-    def sensor(self, name: str) -> Sensor:
-        """Return the sensor of the table."""
-        if self.type in PLACE_QUANTITIES:
-            seen_from = None if self.relative_to is None else marker_at(self.relative_to, self.relative_marker)
-            return PlaceSensor(name, self.place(), self.type, seen_from)
-        if self.type == "angle":
-            ends = marker_at(str(self.body_a), self.marker_a), marker_at(str(self.body_b), self.marker_b)
-            return AngleSensor(name, *ends, axis=np.array(self.axis or (0.0, 0.0, 1.0)))
-        if self.type == "displacement":
-            return DisplacementSensor(name, self.place())
-        if self.type == "elongation":
-            a, b = address_at(self.position_a, self.limit), address_at(self.position_b, self.limit)
-            return ElongationSensor(name, str(self.body), a, b)
-        given: dict[str, Any] = {
-            key: getattr(self, key) for key in SENSOR_TYPES[self.type] if key != "|" and getattr(self, key) is not None
-        }
-        given = {key: np.array(value) if isinstance(value, tuple) else value for key, value in given.items()}
-        kind: Any = SENSORS[self.type]
-        return cast(Sensor, kind(name=name, **given))
-
-    @property
-    def limit(self) -> float:
-        """Largest distance of a node from a position, relative to the size of the body."""
-        return TOLERANCE if self.tolerance is None else self.tolerance
-
-    def place(self) -> Marker:
-        """Return the marker of the table, at an interface, a position, or a node, element or set."""
-        if any(getattr(self, key) is not None for key in MESH):
-            return Marker(str(self.body), node=self.node, element=self.element, set=self.set)
-        return marker_at(str(self.body), self.marker, self.limit)
+#: [sensors.NAME]: a quantity measured on a motion
+SensorSection = Annotated[DescribedSection, OneOf("sensor", SENSORS, "sensors.NAME", is_measured=True)]
 
 
 # channel section ------------------------------------------------------------------------------------------------------
@@ -298,10 +169,10 @@ class ChannelSection(Table):
         """Return the channel of the table."""
         if self.way() == "joint":
             return JointCoordinate(str(self.joint), str(self.coordinate), name, rate)
-        seen_from = None if self.relative_to is None else marker_at(self.relative_to, self.relative_marker)
+        seen_from = None if self.relative_to is None else marker_of(self.relative_to, self.relative_marker)
         direction = np.array(self.direction or (1.0, 0.0, 0.0))
         return Channel(
-            name, marker_at(str(self.body), self.marker), direction, self.quantity or QUANTITIES[0], seen_from, rate
+            name, marker_of(str(self.body), self.marker), direction, self.quantity or QUANTITIES[0], seen_from, rate
         )
 
 

@@ -5,10 +5,9 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BeforeValidator, Field, StringConstraints, model_validator
 
-from cms.body.address import Address
 from fe_models.foundation.toml_file import Matrix3, Table, Vector3, choice
 from floatframe.errors import ModelError
-from floatframe.files.system_file.place_key import PlaceOnBody
+from floatframe.files.system_file.place_key import PlaceOnBody, marker_of
 from floatframe.model.bodies.coordinates import (
     AxialAngle,
     AxialDistance,
@@ -16,22 +15,11 @@ from floatframe.model.bodies.coordinates import (
     JointCoordinateName,
     PointDistance,
 )
-from floatframe.model.bodies.markers import Marker
 
-__all__ = ["CoordinateSection", "NamedCoordinate", "marker_of", "of_joint"]
+__all__ = ["CoordinateSection", "NamedCoordinate", "of_joint"]
 
 Name = Annotated[str, StringConstraints(min_length=1)]
 COORDINATES = {"axial-distance": AxialDistance, "axial-angle": AxialAngle, "point-distance": PointDistance}
-
-
-def marker_of(body: str, place: str | Address | tuple[float, float, float] | None, triad: Any = None) -> Marker:
-    """Return a marker at an interface, node or position; the rows of the triad are its axes."""
-    axes = None if triad is None else np.array(triad).T
-    if isinstance(place, Address):
-        return Marker(body, node=place.node, triad=axes)
-    if isinstance(place, str):
-        return Marker(body, place, triad=axes)
-    return Marker(body, position=None if place is None else np.array(place), triad=axes)
 
 
 def of_joint(value: Any) -> Any:

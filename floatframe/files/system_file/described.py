@@ -18,12 +18,20 @@ import pydantic
 from pydantic import ConfigDict, PlainValidator, TypeAdapter, ValidationError, ValidationInfo, create_model
 from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
 
+from cms.body.address import Address
 from fe_models.foundation.toml_file import Matrix3, Table, choice, is_no_number
 from floatframe.errors import ModelError, SignalError
-from floatframe.files.system_file.coordinate_section import CoordinateSection, NamedCoordinate, marker_of
+from floatframe.files.system_file.coordinate_section import CoordinateSection, NamedCoordinate
 from floatframe.files.system_file.keys import Name
 from floatframe.files.system_file.motion_section import MotionSection
-from floatframe.files.system_file.place_key import PlaceOnBody
+from floatframe.files.system_file.place_key import (
+    TOLERANCE_WORDS,
+    MeasuredPlace,
+    MeshNumber,
+    NodeOrPosition,
+    PlaceOnBody,
+    marker_of,
+)
 from floatframe.files.system_file.signal_section import SignalFunction
 from floatframe.model.bodies.coordinates import JointCoordinateName
 from floatframe.model.bodies.markers import Marker
@@ -41,18 +49,25 @@ class DescribedSection(Table):
 
     model_config = ConfigDict(protected_namespaces=())
     described: ClassVar[Any]  #: the class
+    is_measured: ClassVar[bool]  #: whether its places may be nodes, elements and sets of a mesh
+    type: Any
 
     def object_named(self, name: str, signals: Signals = None) -> Any:
         """Return the object of the table."""
         given: dict[str, Any] = {}
         for each in own_fields(self.described):
-            if is_marker(each.name, hints_of(self.described)):
-                body, place, triad = (getattr(self, key) for key in keys_of_marker(each.name))
-                may_be_body = hints_of(self.described)[each.name] is not Marker and place is None and triad is None
-                given[each.name] = body if may_be_body else marker_of(body, place, triad)
+            hint = hints_of(self.described)[each.name]
+            if is_marker(each.name, hint):
+                keys = marker_keys(each.name, is_measured=self.is_measured)
+                values = {role: getattr(self, key) for role, key in keys.items()}
+                if values["body"] is not None:
+                    is_body = str in get_args(hint) and all(values[role] is None for role in ("place", "triad"))
+                    given[each.name] = values["body"] if is_body else marker_of(**values)
+            elif is_named(hint, self.type):
+                given[each.name] = self.type
             elif each.name in self.model_fields_set:
                 given[each.name] = python_value(getattr(self, each.name), signals)
-        return self.described(name, **given)
+        return self.described(name=name, **given)
 
     @pydantic.model_validator(mode="wrap")
     @classmethod
@@ -98,14 +113,49 @@ def hints_of(kind: Any) -> dict[str, Any]:
     return get_type_hints(kind)
 
 
-def is_marker(name: str, hints: Mapping[str, Any]) -> bool:
+def is_marker(name: str, hint: Any) -> bool:
     """Whether a field is a marker, which has keys for its body, its place and its axes."""
-    return name.startswith("marker") and Marker in (hints[name], *get_args(hints[name]))
+    return (name.startswith("marker") or name == "relative_to") and Marker in (hint, *get_args(hint))
 
 
-def keys_of_marker(name: str) -> tuple[str, str, str]:
-    """Return the keys of the marker "marker_a": "body_a", "marker_a" and "triad_a"."""
-    return name.replace("marker", "body"), name, name.replace("marker", "triad")
+def is_named(hint: Any, kind: str) -> bool:
+    """Whether the `type` of the table is the value of a field, one of several literals."""
+    return get_origin(hint) is Literal and kind in get_args(hint)
+
+
+def marker_keys(name: str, *, is_measured: bool) -> dict[str, str]:
+    """Return the keys of the marker "marker_a": "body_a", "marker_a" and "triad_a", by what they are."""
+    if name == "relative_to":
+        return {"body": name, "place": "relative_marker"}
+    keys = {"body": name.replace("marker", "body"), "place": name, "triad": name.replace("marker", "triad")}
+    return keys | ({key: key for key in OF_MESH} if is_measured and name == "marker" else {})
+
+
+OF_MESH = {
+    "node": (MeshNumber, "the number of a kept node in the mesh of the body"),
+    "element": (MeshNumber, "the number of an element on the surface of its mesh"),
+    "set": (str, "the name of a set of its mesh"),
+    "tolerance": (float, TOLERANCE_WORDS),
+}
+
+
+def fields_of_marker(name: str, meaning: str, *, is_measured: bool, is_needed: bool) -> dict[str, Any]:
+    """Return the keys of a marker with their types and descriptions."""
+    keys = marker_keys(name, is_measured=is_measured)
+    text = ": ".join(filter(None, (f"an interface, or a position [x, y, z] in {keys['body']}", meaning)))
+    parts = {
+        "body": (Name, 'the name of a body, or "ground"'),
+        "place": (MeasuredPlace if is_measured else PlaceOnBody, text),
+        "triad": (Matrix3, f"the axes of {name}, [x axis, y axis, z axis]"),
+    } | OF_MESH
+    found: dict[str, Any] = {}
+    for role, key in keys.items():
+        kind, description = parts[role]
+        if role == "body" and is_needed:
+            found[key] = (kind, pydantic.Field(description=description))
+        else:
+            found[key] = (kind | None, pydantic.Field(None, description=description))
+    return found
 
 
 def meanings_of(kind: Any) -> dict[str, str]:
@@ -116,7 +166,7 @@ def meanings_of(kind: Any) -> dict[str, str]:
 
 
 @cache
-def section_of(name: str, kind: Any, place: str, stated: tuple[type, ...] = ()) -> type[DescribedSection]:
+def section_of(name: str, kind: Any, place: str, stated: tuple[type, ...], is_measured: bool) -> type[DescribedSection]:
     """Return the model of the tables that describe an object of a class.
 
     Parameters
@@ -129,20 +179,18 @@ def section_of(name: str, kind: Any, place: str, stated: tuple[type, ...] = ()) 
         Key path of the tables, such as "joints.NAME".
     stated
         Fields whose default has one of these types must be stated in a file.
+    is_measured
+        Whether places may be nodes, elements and sets of a mesh.
     """
     keys: dict[str, Any] = {"type": (Literal[name], pydantic.Field(description=f'"{name}"'))}
     hints, meanings = hints_of(kind), meanings_of(kind)
     for each in own_fields(kind):
-        if is_marker(each.name, hints):
-            body, marker, triad = keys_of_marker(each.name)
-            keys[body] = (Name, pydantic.Field(description='the name of a body, or "ground"'))
-            place_text = f"an interface, or a position [x, y, z] in {body}: {meanings.get(each.name, '')}".rstrip(": ")
-            keys[marker] = (PlaceOnBody | None, pydantic.Field(None, description=place_text))
-            axes_text = f"the axes of {marker}, [x axis, y axis, z axis]"
-            keys[triad] = (Matrix3 | None, pydantic.Field(None, description=axes_text))
-        elif (key := key_of(hints[each.name])) is not None:
-            text = ": ".join(filter(None, (key.meaning, meanings.get(each.name))))
-            default = each.default if each.default_factory is MISSING else each.default_factory()
+        hint, meaning = hints[each.name], meanings.get(each.name, "")
+        default = each.default if each.default_factory is MISSING else each.default_factory()
+        if is_marker(each.name, hint):
+            keys |= fields_of_marker(each.name, meaning, is_measured=is_measured, is_needed=default is MISSING)
+        elif not is_named(hint, name) and (key := key_of(hint)) is not None:
+            text = ": ".join(filter(None, (key.meaning, meaning)))
             if default is MISSING or isinstance(default, stated):
                 keys[each.name] = (key.type, pydantic.Field(description=text))
             else:
@@ -150,7 +198,7 @@ def section_of(name: str, kind: Any, place: str, stated: tuple[type, ...] = ()) 
     summary = (inspect.getdoc(kind) or "").partition("\n\n")[0]
     told = f'[{place}] of type "{name}": {summary}'
     model = create_model(kind.__name__, __base__=DescribedSection, __doc__=told, __cls_kwargs__={"title": name}, **keys)
-    model.described = kind
+    model.described, model.is_measured = kind, is_measured
     return model
 
 
@@ -172,7 +220,9 @@ def key_of(hint: Any) -> Key | None:
     if origin is Literal:
         return Key(choice("value", lambda: within), f"one of {', '.join(map(str, within))}")
     if origin in (Union, UnionType):
-        keys = list(dict.fromkeys(key for each in within if each is not NoneType and (key := key_of(each)) is not None))
+        # the text "hub.angle" is read by the key of a coordinate
+        others = {NoneType} | ({str} if JointCoordinateName in within else set())
+        keys = list(dict.fromkeys(key for each in within if each not in others and (key := key_of(each)) is not None))
         return keys[0] if len(keys) == 1 else either(keys) if keys else None
     inner = key_of(within[-1]) if isinstance(origin, type) and issubclass(origin, Mapping | Sequence) else None
     if inner is not None:
@@ -221,6 +271,7 @@ KEYS: dict[Any, Key] = {
     str: Key(str, "text"),
     TimeFunction: Key(MotionSection, "the table of a function"),
     JointCoordinateName: Key(NamedCoordinate, '"JOINT.COORDINATE" or a table of a coordinate'),
+    Address: Key(NodeOrPosition, "a position [x, y, z] in the body, or {node = 12}"),
     np.ndarray: Key(
         Annotated[Any, PlainValidator(numbers_of_any_shape, json_schema_input_type=Numbers)], "a list of numbers"
     ),
@@ -252,6 +303,8 @@ class OneOf:
         Values of `type` by their names in other programs.
     stated
         Fields whose default has one of these types must be stated in a file.
+    is_measured
+        Whether places may be nodes, elements and sets of a mesh.
     """
 
     what: str
@@ -259,12 +312,13 @@ class OneOf:
     place: str
     elsewhere: Mapping[str, str] = field(default_factory=dict)
     stated: tuple[type, ...] = ()
+    is_measured: bool = False
 
     def model_of(self, value: Any) -> type[Table]:
         """Return the model of a table; if its type is missing or unknown, a model that says so."""
         kind = value.get("type") if isinstance(value, dict) else None
         if isinstance(kind, str) and kind in self.kinds:
-            return section_of(kind, self.kinds[kind], self.place, self.stated)
+            return section_of(kind, self.kinds[kind], self.place, self.stated, self.is_measured)
         typed = choice(f"type of {self.what}", lambda: tuple(self.kinds), self.elsewhere)
         field = pydantic.Field(description=f"one of {', '.join(self.kinds)}")
         return create_model(self.what, __base__=AnyTable, type=(typed, field))

@@ -13,10 +13,9 @@ from fe_models.foundation.paths import near_file
 from fe_models.foundation.toml_file import Matrix3, Table
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
-from floatframe.files.system_file.coordinate_section import marker_of
 from floatframe.files.system_file.keys import Name
 from floatframe.files.system_file.motion_section import MotionSection
-from floatframe.files.system_file.place_key import PlaceOnBody
+from floatframe.files.system_file.place_key import PlaceOnBody, marker_of
 from floatframe.files.system_file.signal_section import SignalFunction
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.elements.element import Element

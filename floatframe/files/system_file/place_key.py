@@ -2,6 +2,7 @@
 
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import BeforeValidator
 
 from cms.body.address import KINDS_OF_ADDRESS, Address
@@ -11,7 +12,7 @@ from fe_models.foundation.toml_file import is_no_number, numbers
 from fe_models.foundation.words import nearest, quoted
 from floatframe.model.bodies.markers import Marker
 
-__all__ = ["TOLERANCE_WORDS", "MeasuredPlace", "MeshNumber", "NodeOrPosition", "PlaceOnBody", "address_at", "marker_at"]
+__all__ = ["TOLERANCE_WORDS", "MeasuredPlace", "MeshNumber", "NodeOrPosition", "PlaceOnBody", "marker_of"]
 
 TOLERANCE_WORDS = (
     f"largest distance of a node from a position, relative to the size of the body; default: {TOLERANCE:g}"
@@ -87,16 +88,23 @@ MeasuredPlace = Annotated[Any, BeforeValidator(measured_place)]  #: of sensors: 
 NodeOrPosition = Annotated[Any, BeforeValidator(node_or_position)]  #: `Position` or `Address`
 
 
-def address_at(place: Any, tolerance: float) -> Address:
-    """Return the address of a position; an address is returned unchanged."""
-    return place if isinstance(place, Address) else Address(position=place, tolerance=tolerance)
+def marker_of(
+    body: str,
+    place: str | Position | Address | None = None,
+    triad: Any = None,
+    *,
+    tolerance: float | None = None,
+    **mesh: Any,
+) -> Marker:
+    """Return a marker at an interface, position or address; the rows of the triad are its axes.
 
-
-def marker_at(body: str, place: str | Position | Address | None, tolerance: float = TOLERANCE) -> Marker:
-    """Return a marker at an interface, position, node, element or set."""
+    The place may also be a `node`, `element` or `set` of the mesh.
+    """
+    axes = None if triad is None else np.array(triad).T
+    limit = TOLERANCE if tolerance is None else tolerance
     if isinstance(place, str):
-        return Marker(body, place)
+        return Marker(body, place, triad=axes, **mesh)
     if isinstance(place, Address):
-        named = {kind: getattr(place, kind) for kind in KINDS_OF_ADDRESS}
-        return Marker(body, **named, tolerance=place.tolerance)
-    return Marker(body, position=place, tolerance=tolerance)
+        mesh |= {kind: getattr(place, kind) for kind in KINDS_OF_ADDRESS}
+        return Marker(body, triad=axes, tolerance=place.tolerance, **mesh)
+    return Marker(body, position=place, triad=axes, tolerance=limit, **mesh)

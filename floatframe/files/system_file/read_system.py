@@ -206,7 +206,7 @@ def read_system(
         if any(data.system.gravity):
             forces.insert(0, Gravity(np.array(data.system.gravity)))
         name = data.system.name or path.stem
-        sensors = [section.sensor(key) for key, section in data.sensors.items()]
+        sensors = [section.object_named(key) for key, section in data.sensors.items()]
         data_files = [*content.files[1:], *(each.file for each in data.signals.values()), *element_files]
         modules = (section.module_file(path.parent) for section in data.controllers.values())
         data_files += [file for file in modules if file is not None]

@@ -4,9 +4,10 @@
 """
 
 from collections.abc import Sequence
-from dataclasses import fields
-from typing import cast
+from dataclasses import fields, is_dataclass
+from typing import Any, cast
 
+from fe_models.door import Registry
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
@@ -72,29 +73,40 @@ __all__ = [
 ]
 
 
-#: sensor classes by the `type` of a table [sensors.NAME]; a new sensor is added only here. The fields of a class are
-#: the keys of its table, unless `channel_section.KEYS` has others
-SENSORS: dict[str, type[Sensor]] = {
-    **dict.fromkeys(PLACE_QUANTITIES, PlaceSensor),
-    "angle": AngleSensor,
-    "bushing": BushingSensor,
-    "control": ControlSensor,
-    "coordinate": JointCoordinate,
-    "coupler": CouplerSensor,
-    "displacement": DisplacementSensor,
-    "element": ElementSensor,
-    "elongation": ElongationSensor,
-    "energy": EnergySensor,
-    "interface-force": InterfaceForceSensor,
-    "mode": ModeSensor,
-    "momentum": MomentumSensor,
-    "reaction": ReactionSensor,
-    "recovery": RecoverySensor,
-    "spring": SpringSensor,
-    "strain": StrainGauge,
-    "stress": StressSensor,
-    "von-mises": VonMisesSensor,
-}
+def is_sensor(kind: Any) -> bool:
+    """Whether an object is a class of sensors."""
+    return is_dataclass(kind) and all(callable(getattr(kind, method, None)) for method in ("measure", "linear"))
+
+
+#: sensor classes by the `type` of a table [sensors.NAME]; their fields are the keys of the table. Other packages add
+#: classes by entry points
+SENSORS: Registry[type[Sensor]] = Registry(
+    "floatframe.sensors",
+    {
+        **dict.fromkeys(PLACE_QUANTITIES, PlaceSensor),
+        "angle": AngleSensor,
+        "bushing": BushingSensor,
+        "control": ControlSensor,
+        "coordinate": JointCoordinate,
+        "coupler": CouplerSensor,
+        "displacement": DisplacementSensor,
+        "element": ElementSensor,
+        "elongation": ElongationSensor,
+        "energy": EnergySensor,
+        "interface-force": InterfaceForceSensor,
+        "mode": ModeSensor,
+        "momentum": MomentumSensor,
+        "reaction": ReactionSensor,
+        "recovery": RecoverySensor,
+        "spring": SpringSensor,
+        "strain": StrainGauge,
+        "stress": StressSensor,
+        "von-mises": VonMisesSensor,
+    },
+    ModelError,
+    kind="a dataclass with the methods measure and linear",
+    is_kind=is_sensor,
+)
 
 
 def measured(system: System, trajectory: Trajectory, sensors: Sequence[Sensor] | None = None) -> dict[str, Measurement]:

@@ -1,6 +1,7 @@
 """Sensors of joint loads, of energies and momenta, and of modal coordinates."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -25,9 +26,8 @@ from floatframe.results.small_motions.rows import LinearColumns
 from floatframe.results.small_motions.small_motions import SmallMotions
 from floatframe.results.trajectory import Energies, Trajectory
 
-__all__ = ["AXES", "EnergySensor", "ModeSensor", "MomentumSensor", "ReactionSensor"]
+__all__ = ["EnergySensor", "ModeSensor", "MomentumSensor", "ReactionSensor"]
 
-AXES = ("ground", "marker")
 ROUNDING = 1e-12  #: magnitude, relative to the largest wrench, below which a value is a rounding error
 ENERGIES = (*Energies.__dataclass_fields__, "total", "balance")
 
@@ -50,11 +50,7 @@ class ReactionSensor:
 
     name: str
     of: str
-    axes: str = "ground"
-
-    def __post_init__(self) -> None:
-        if self.axes not in AXES:
-            raise ModelError(f"sensor {self.name!r}: axes: expected one of {', '.join(AXES)}, got {self.axes!r}")
+    axes: Literal["ground", "marker"] = "ground"
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return force and moment over time, as components and magnitudes."""

@@ -5,6 +5,7 @@ of the nodes of an element or set.
 """
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -179,14 +180,8 @@ class PlaceSensor:
 
     name: str
     marker: Marker
-    quantity: str = "position"
+    quantity: Literal["position", "velocity", "acceleration", "rotation-vector", "angular-velocity"] = "position"
     relative_to: Marker | None = None
-
-    def __post_init__(self) -> None:
-        if self.quantity not in PLACE_QUANTITIES:
-            raise ModelError(
-                f"sensor {self.name!r}: quantity: expected one of {', '.join(PLACE_QUANTITIES)}, got {self.quantity!r}"
-            )
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return x, y, z and size over time."""

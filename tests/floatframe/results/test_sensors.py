@@ -280,10 +280,10 @@ def test_results_whose_system_file_has_gone_or_changed_are_still_shown(spin, cap
 @pytest.mark.parametrize(("old", "new", "words"), [
     ('type = "velocity"', 'type = "velocty"', "did you mean 'velocity'"),
     ('type = "velocity"\nbody = "part"', 'type = "velocity"\nbody = "prt"', "sensors.tip.body = "),
-    ('type = "von-mises"\n', 'type = "von-mises"\nmode = 3\n', "a sensor of type von-mises has no key mode"),
-    ('of = "hinge"\n', "", "of: missing; expected the name of a joint, spring, bushing, coupler"),
-    ('axes = "marker"', 'axes = "body"', "axes: expected one of ground, marker"),
-    ('type = "von-mises"', 'type = "stress"', "expected either position or point"),
+    ('type = "von-mises"\n', 'type = "von-mises"\nmode = 3\n', 'mode: unknown key of type "von-mises"; did you'),
+    ('of = "hinge"\n', "", "of: missing; expected text: Name of a joint or spring-damper (line 28)"),
+    ('axes = "marker"', 'axes = "body"', 'axes = "body": unknown value; choices: ground, marker'),
+    ('type = "von-mises"', 'type = "stress"', "expected either a position or a stress point"),
 ])  # fmt: skip
 def test_mistakes_in_sensors_are_answered_with_key_and_choices(spin, old, new, words):
     assert TEXT.count(old) == 1

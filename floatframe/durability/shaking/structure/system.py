@@ -350,7 +350,7 @@ def observed_rows(system: System, about: Equilibrium, each: Observed) -> list[Ro
             found.append(Rows(outputs, [Column(stress, c) for c in STRESS_COMPONENTS], np.eye(6)))
             continue
         marker = Marker(each.body, each.interface, tolerance=each.tolerance, **way)
-        place = PlaceSensor(group, marker, {"acceleration": wish, "displacement": "position"}[wish])
+        place = PlaceSensor(group, marker, "position" if wish == "displacement" else "acceleration")
         outputs = [Output(f"{group} {axis}", wish, unit, group, words) for axis in "xyz"]
         found.append(Rows(outputs, [Column(place, axis) for axis in "xyz"], np.eye(3), wish == "displacement"))
     return found
