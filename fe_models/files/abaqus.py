@@ -7,6 +7,7 @@ are not supported raise an error.
 """
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,7 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from fe_models.errors import MeshError
-from fe_models.files.abaqus_deck import DeckBlock, mesh_blocks
+from fe_models.files.abaqus_deck import DeckBlock, deck_blocks, refuse_unread
+from fe_models.files.decks.abaqus.assembly import only_part
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.cells.raw_mesh import RawBlock, RawMesh
@@ -50,6 +52,9 @@ _IGNORED = (
     "MASS", "ROTARYI", "SPRING", "DASHPOT", "CONN3D", "DCOUP3D", "GAPUNI", "JOINTC",
     "B23", "B31OS", "B32OS", "B31H", "B32H", "B33H", "PIPE", "ELBOW", "FRAME", "ITS", "SC6R", "SC8R",
 )  # fmt: skip
+
+#: keywords that affect the body but not its mesh
+_CONNECTING = ("SURFACE", "TIE", "MPC", "EQUATION", "COUPLING", "RIGID BODY", "TRANSFORM")
 
 
 @dataclass(frozen=True)
@@ -158,7 +163,11 @@ def read_abaqus(path: Path, data: bytes) -> RawMesh:
     """
     where = f"mesh {path}"
     included: dict[str, str] = {}
-    blocks, notes = mesh_blocks(where, data.decode("utf-8", "replace"), path.parent, included)
+    blocks = deck_blocks(where, data.decode("utf-8", "replace"), path.parent, included)
+    refuse_unread(where, blocks)
+    blocks, notes = only_part(where, blocks)
+    counts = Counter(block.keyword for block in blocks)
+    notes += [f"{counts[keyword]} blocks *{keyword} were left out" for keyword in counts if keyword in _CONNECTING]
     mesh = deck_mesh(where, blocks)
     return replace(raw_mesh_of(mesh, [*notes, *naming_note(mesh)]), included=included)
 

@@ -1,4 +1,4 @@
-"""Blocks of an Abaqus or CalculiX deck that define its mesh, and keywords that cannot be read correctly."""
+"""Blocks of an Abaqus or CalculiX deck, and keywords that cannot be read correctly."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from pathlib import Path
 from fe_models.errors import MeshError
 from fe_models.foundation.paths import near_file
 
-__all__ = ["DeckBlock", "deck_blocks", "mesh_blocks", "refuse_unread"]
+__all__ = ["DeckBlock", "deck_blocks", "refuse_unread"]
 
 DEEPEST = 10  #: largest depth of nested include files
 _REFUSED = {
@@ -69,22 +69,6 @@ def deck_blocks(where: str, text: str, folder: Path, included: dict[str, str] | 
     if not blocks:
         raise MeshError(f"{where}: expected an Abaqus deck (keyword lines such as *NODE), got {text[:30]!r}")
     return blocks
-
-
-def mesh_blocks(
-    where: str, text: str, folder: Path, included: dict[str, str] | None = None
-) -> tuple[list[DeckBlock], list[str]]:
-    """Return the blocks of a deck that define its mesh, and descriptions of the omitted ones.
-
-    Raises
-    ------
-    MeshError
-        If the text is no deck, has several parts, moves its instance, or generates nodes or elements by keywords.
-    """
-    blocks = deck_blocks(where, text, folder, included)
-    refuse_unread(where, blocks)
-    blocks, notes = _one_part(where, blocks)
-    return blocks, notes + _left_out(blocks)
 
 
 @dataclass(frozen=True)
@@ -197,54 +181,3 @@ def refuse_unread(where: str, blocks: list[DeckBlock]) -> None:
                 f"{where}, {block.place}: *NODE in a cylindrical or spherical system is not "
                 f"read: write the nodes in global coordinates"
             )
-
-
-def _one_part(where: str, blocks: list[DeckBlock]) -> tuple[list[DeckBlock], list[str]]:
-    """Return the blocks of a deck without parts, or of its only part, and the omitted blocks."""
-    parts = [b for b in blocks if b.keyword == "PART"]
-    instances = [b for b in blocks if b.keyword == "INSTANCE"]
-    if not parts and not instances:
-        return blocks, []
-    if len(parts) > 1 or len(instances) > 1:
-        raise MeshError(
-            f"{where}: the deck has {len(parts)} parts and {len(instances)} instances; expected one part "
-            f"with one instance. Export one part, or the assembly as a flat deck"
-        )
-    for instance in instances:
-        if instance.lines:
-            raise MeshError(
-                f"{where}, line {instance.line_number}: the instance is moved (translation or rotation "
-                f"lines below *INSTANCE), which is not read; export a flat deck"
-            )
-    name = instances[0].parameters.get("NAME", "") if instances else ""
-    kept, notes, scope, assembly_nodes = [], [], "", 0
-    for block in blocks:
-        if block.keyword in ("PART", "INSTANCE", "ASSEMBLY"):
-            scope = block.keyword
-        elif block.keyword == "END PART":
-            scope = ""
-        elif block.keyword == "END INSTANCE":
-            scope = "ASSEMBLY"
-        elif block.keyword == "END ASSEMBLY":
-            scope = ""
-        elif scope in ("PART", "INSTANCE") or block.keyword not in ("NODE", "ELEMENT", "NSET", "ELSET"):
-            kept.append(block)
-        elif block.keyword in ("NSET", "ELSET") and block.parameters.get("INSTANCE", "").upper() == name.upper() != "":
-            kept.append(block)
-        else:
-            assembly_nodes += 1
-    if assembly_nodes:
-        notes.append(
-            f"{assembly_nodes} blocks of nodes, elements or sets of the assembly itself (such as reference "
-            f"points) were left out"
-        )
-    return kept, notes
-
-
-def _left_out(blocks: list[DeckBlock]) -> list[str]:
-    """Name the keywords that affect the mesh but are not supported."""
-    counts: dict[str, int] = {}
-    for block in blocks:
-        if block.keyword in ("SURFACE", "TIE", "MPC", "EQUATION", "COUPLING", "RIGID BODY", "TRANSFORM"):
-            counts[block.keyword] = counts.get(block.keyword, 0) + 1
-    return [f"{count} blocks *{keyword} were left out" for keyword, count in counts.items()]

@@ -17,7 +17,7 @@ from fe_models.files.abaqus_deck import DeckBlock
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["TURNED", "flat_assembly"]
+__all__ = ["TURNED", "flat_assembly", "only_part"]
 
 #: parameter added here to blocks whose components are along the axes of an instance: the nine numbers of R
 TURNED = "TURNED WITH ITS INSTANCE"
@@ -83,6 +83,41 @@ def flat_assembly(where: str, blocks: list[DeckBlock]) -> FlatAssembly:
         return FlatAssembly(out, [f"instances are written out; {'; '.join(words[:8])}"] if own else [])
     names = tuple(head.parameters.get("NAME", "") for head, _ in instances)
     return FlatAssembly(out, [f"instances are written out; {'; '.join(words[:8])}"], names, step)
+
+
+def only_part(where: str, blocks: list[DeckBlock]) -> tuple[list[DeckBlock], list[str]]:
+    """Return the blocks of a deck without parts, or of its only part, with the names of the part, and notes.
+
+    Raises
+    ------
+    MeshError
+        If there are several parts or instances, or the instance is moved.
+    """
+    parts, instances, own, model = _sorted(where, blocks)
+    if not parts and not instances:
+        return blocks, []
+    if len(parts) > 1 or len(instances) > 1:
+        raise MeshError(
+            f"{where}: the deck has {len(parts)} parts and {len(instances)} instances; expected one part "
+            f"with one instance. Export one part, or the assembly as a flat deck"
+        )
+    for head, _ in instances:
+        if head.lines:
+            raise MeshError(
+                f"{where}, line {head.line_number}: the instance is moved (translation or rotation "
+                f"lines below *INSTANCE), which is not read; export a flat deck"
+            )
+    name = instances[0][0].parameters.get("NAME", "").upper() if instances else ""
+    found = [*(b for part in parts.values() for b in part), *(b for _, extra in instances for b in extra)]
+    left_out = 0
+    for block in own:
+        is_of_part = block.keyword in ("NSET", "ELSET") and block.parameters.get("INSTANCE", "").upper() == name != ""
+        if is_of_part or block.keyword not in SETS:
+            found.append(block)
+        else:
+            left_out += 1
+    words = "blocks of nodes, elements or sets of the assembly itself (such as reference points) were left out"
+    return [*found, *model], [f"{left_out} {words}"] if left_out else []
 
 
 def _sorted(

@@ -25,7 +25,7 @@ from fe_models.files.decks.nastran.superelements import (
     place_superelements,
 )
 from fe_models.files.decks.nastran.supports import hold_points
-from fe_models.files.nastran import ELEMENT_TYPES, nodes_of
+from fe_models.files.nastran import element_of, mesh_of_elements
 from fe_models.meshes.cells.raw_mesh import RawBlock, RawMesh
 
 __all__ = ["CaseControl", "case_control", "read_nastran_deck", "read_parameters"]
@@ -192,39 +192,19 @@ def _deck(path: Path, model: NastranModel, included: dict[str, str]) -> Deck:
 
 def _mesh(model: NastranModel) -> RawMesh:
     """Return the grid points, the elements with a section, and the groups."""
-    numbers = np.array(list(model.points.positions), dtype=np.int64)
-    place = {int(number): row for row, number in enumerate(numbers)}
-    positions = np.array([model.points.positions[int(number)] for number in numbers])
-    cells: dict[tuple[str, int, str], tuple[list[int], list[list[int]]]] = {}
-    for name in (*SOLIDS, *SHELLS, *BARS):
-        for card in model.cards.get(name, ()):
-            number = card.integer(1)
-            group = model.elements.get(number, (name, ""))[1]
-            widest = max(ELEMENT_TYPES[name])
-            given = [card.text(k) for k in range(3, 3 + widest)]
-            for end in (0, 1):
-                if (number, end) in model.ends:
-                    given[end] = str(model.ends[number, end])
-            if name in SHELLS and widest == 4:
-                given = given[:4]
-            count, words = nodes_of(card.where, name, given)
-            rows = [place.get(int(word), -1) for word in words]
-            if -1 in rows:
-                raise MeshError(f"{card.where} {number}: names a grid point that is not defined")
-            listed = cells.setdefault((name, count, group), ([], []))
-            listed[0].append(number)
-            listed[1].append(rows)
-    blocks = []
-    for (name, count, group), (own_numbers, rows_of_nodes) in cells.items():
-        kind, order = ELEMENT_TYPES[name][count]
-        table = np.array(rows_of_nodes, dtype=np.int64)
-        table = table if order is None else table[:, order]
-        groups = {group: np.arange(len(table))} if group else {}
-        blocks.append(RawBlock(kind, table, groups, np.array(own_numbers, dtype=np.int64)))
+    cards = [card for name in (*SOLIDS, *SHELLS, *BARS) for card in model.cards.get(name, ())]
+    elements = []
+    for card in cards:
+        number = card.integer(1)
+        ends = {end: str(model.ends[number, end]) for end in (0, 1) if (number, end) in model.ends}
+        elements.append(element_of(card, model.elements.get(number, (card.name, ""))[1], ends))
+    mesh = mesh_of_elements(model.where, model.points.positions, elements)
+    place = {int(number): row for row, number in enumerate(model.points.positions)}
+    blocks = list(mesh.blocks)
     for name, faces in model.faces.items():
         for kind, n in (("triangle", 3), ("quad", 4)):
             table = np.array([[place[node] for node in face] for face in faces if len(face) == n], dtype=np.int64)
             if len(table):
                 blocks.append(RawBlock(kind, table, {name: np.arange(len(table))}))
     sets = {name: np.array([place[node] for node in nodes], dtype=np.int64) for name, nodes in model.groups.items()}
-    return RawMesh(positions, tuple(blocks), sets, numbers)
+    return replace(mesh, blocks=tuple(blocks), node_sets=sets)
