@@ -15,8 +15,8 @@ import numpy as np
 import scipy.sparse as sp
 
 import fe_models
-from fe_models.files.nastran_matrices.op4 import read_op4
-from fe_models.files.nastran_matrices.write_op4 import write_op4
+from fe_models.files.nastran.matrices.op4 import read_op4
+from fe_models.files.nastran.matrices.write_op4 import write_op4
 
 TRIES = 3
 

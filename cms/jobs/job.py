@@ -46,7 +46,7 @@ ROLES = ("K", "M", "D", "dofs")  #: roles of matrix files: stiffness, mass, damp
 
 def deck_programs() -> tuple[str, ...]:
     """Return the programs whose decks have the same suffix."""
-    from fe_models.files.decks.abaqus.elements import SOLID_RULES
+    from fe_models.files.abaqus.elements import SOLID_RULES
 
     return tuple(SOLID_RULES)
 

@@ -9,11 +9,11 @@ import numpy as np
 
 from fe_models.door import Registry
 from fe_models.errors import FeModelsError, MeshError
-from fe_models.files.abaqus import read_abaqus
+from fe_models.files.abaqus.mesh import read_abaqus
 from fe_models.files.cad.cad_units import CAD_FORMATS
 from fe_models.files.gmsh import read_gmsh
 from fe_models.files.med import read_med
-from fe_models.files.nastran import read_nastran
+from fe_models.files.nastran.mesh import read_nastran
 from fe_models.files.vtk import read_vtk
 from fe_models.foundation.arrays import IntArray
 from fe_models.foundation.digest import file_digest

@@ -10,8 +10,8 @@ import scipy.sparse as sp
 from numpy.testing import assert_allclose, assert_array_equal
 
 from cms.exchange.importers.element_rows import FORCE_ITEMS
-from fe_models.files.nastran_matrices.op4 import read_op4
-from fe_models.files.nastran_matrices.write_op4 import write_op4
+from fe_models.files.nastran.matrices.op4 import read_op4
+from fe_models.files.nastran.matrices.write_op4 import write_op4
 
 pytestmark = pytest.mark.external
 

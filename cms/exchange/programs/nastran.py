@@ -11,8 +11,8 @@ from cms.exchange.exporters.writer import Request, WrittenFiles
 from cms.exchange.importers.element_rows import ForeignRows, force_rows, motion_rows, stress_rows
 from cms.exchange.importers.superelement import RecoveryRows, Superelement
 from cms.reduction.interface_model import InterfaceModel, interface_model
-from fe_models.files.nastran_matrices.superelement import SCALAR, TEXTS, NastranSuperelement, read_superelement
-from fe_models.files.nastran_matrices.write_op4 import op4_parts
+from fe_models.files.nastran.matrices.superelement import SCALAR, TEXTS, NastranSuperelement, read_superelement
+from fe_models.files.nastran.matrices.write_op4 import op4_parts
 from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["is_nastran", "make_dmig", "make_op4", "nastran_superelement", "read_nastran"]

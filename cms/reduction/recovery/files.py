@@ -21,7 +21,7 @@ from cms.reduction.interface_model import InterfaceModel, interface_model
 from cms.reduction.recovery.interface_rows import node_words
 from cms.reduction.recovery.load_columns import WRENCH, forces_of_loads, on_coordinates
 from fe_models.body.rigid_motion import rigid_motion_of_points
-from fe_models.files.nastran_matrices.write_op4 import op4_parts
+from fe_models.files.nastran.matrices.write_op4 import op4_parts
 from fe_models.foundation.arrays import MOTION_COMPONENTS, Array
 from fe_models.foundation.documents.table import Table
 from fe_models.foundation.errors import ArgumentError

@@ -1,9 +1,9 @@
 """Tables of the fields of all programs in Markdown, for the page docs/deck_fields.md."""
 
-from fe_models.files.decks.abaqus.keywords import PARAMETERS, parameters_of
-from fe_models.files.decks.ansys.command_fields import COLUMNS, COMMANDS, fields_of_command
+from fe_models.files.abaqus.keywords import PARAMETERS, parameters_of
+from fe_models.files.ansys.command_fields import COLUMNS, COMMANDS, fields_of_command
 from fe_models.files.decks.field_table import TableField, markdown_table, parse_fields
-from fe_models.files.decks.nastran.card_fields import CARDS, fields_of
+from fe_models.files.nastran.deck.card_fields import CARDS, fields_of
 
 __all__ = ["field_tables"]
 

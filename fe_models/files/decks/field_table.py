@@ -14,7 +14,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from fe_models.files.bulk_data.cards import real_of
+from fe_models.files.nastran.bulk_data.cards import real_of
 
 __all__ = ["TableField", "has_default", "markdown_table", "parse_fields"]
 

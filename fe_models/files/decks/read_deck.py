@@ -4,10 +4,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 from fe_models.errors import FeModelsError, MeshError
-from fe_models.files.decks.abaqus.whole_deck import read_abaqus_deck
-from fe_models.files.decks.ansys.cdb import read_cdb_deck
+from fe_models.files.abaqus.whole_deck import read_abaqus_deck
+from fe_models.files.ansys.cdb import read_cdb_deck
 from fe_models.files.decks.deck import Deck
-from fe_models.files.decks.nastran.whole_deck import read_nastran_deck
+from fe_models.files.nastran.deck.whole_deck import read_nastran_deck
 from fe_models.foundation.formats import ReadFormat, by_suffix
 from fe_models.foundation.paths import bytes_of, reading
 from fe_models.foundation.words import nearest, quoted

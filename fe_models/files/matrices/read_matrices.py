@@ -13,8 +13,19 @@ import scipy.io
 import scipy.sparse as sp
 
 from fe_models.errors import FeModelsError, MatrixError
-from fe_models.files.ansys_matrices.records import is_ansys_binary
-from fe_models.files.matrices.ansys import read_full_part, read_sub_part
+from fe_models.files.abaqus.matrices import (
+    calculix_neighbours,
+    is_coordinates,
+    is_labelled,
+    is_user_element,
+    read_calculix_dofs,
+    read_calculix_matrix,
+    read_coordinates,
+    read_labelled,
+    read_user_element,
+)
+from fe_models.files.ansys.matrices import read_full_part, read_sub_part
+from fe_models.files.ansys.records import is_ansys_binary
 from fe_models.files.matrices.foreign_matrices import ROLES, ForeignMatrices, joined
 from fe_models.files.matrices.matlab import (
     MOST_INFLATED,
@@ -25,22 +36,12 @@ from fe_models.files.matrices.matlab import (
     read_matlab_7,
     real_matrix,
 )
-from fe_models.files.matrices.nastran import read_op2_part, read_op4_part, read_punch_part
+from fe_models.files.matrices.matrix_market import is_matrix_market, read_matrix_market, role_by_stem
 from fe_models.files.matrices.request import Request
-from fe_models.files.matrices.text_files.abaqus import (
-    calculix_neighbours,
-    is_labelled,
-    is_user_element,
-    read_calculix_dofs,
-    read_calculix_matrix,
-    read_labelled,
-    read_user_element,
-)
-from fe_models.files.matrices.text_files.abaqus_text import is_coordinates, read_coordinates
-from fe_models.files.matrices.text_files.matrix_market import is_matrix_market, read_matrix_market, role_by_stem
 from fe_models.files.matrices.triangles import mirrored
-from fe_models.files.nastran_matrices.op2 import is_op2
-from fe_models.files.nastran_matrices.op4 import is_op4
+from fe_models.files.nastran.matrices.op2 import is_op2
+from fe_models.files.nastran.matrices.op4 import is_op4
+from fe_models.files.nastran.matrices.parts import read_op2_part, read_op4_part, read_punch_part
 from fe_models.foundation.digest import file_digest
 from fe_models.foundation.formats import HEAD, ReadFormat, format_of
 from fe_models.foundation.paths import bytes_of, reading

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 from fe_models.assembly.constraints import characteristic_length, weighted_motion
 from fe_models.body.couplings.couplings import mean_motion
 from fe_models.body.rigid_motion import rigid_motion_of_points
-from fe_models.files.bulk_data.cards import read_cards
-from fe_models.files.bulk_data.coordinate_systems import read_grid_points
+from fe_models.files.nastran.bulk_data.cards import read_cards
+from fe_models.files.nastran.bulk_data.coordinate_systems import read_grid_points
 from fe_models.foundation.errors import BodyError
 
 DATA = Path(__file__).parent / "data"

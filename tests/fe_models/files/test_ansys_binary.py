@@ -12,8 +12,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.errors import MatrixError
 from fe_models.files import read_matrices
-from fe_models.files.ansys_matrices.full import read_full
-from fe_models.files.ansys_matrices.sub import SCALAR, read_sub
+from fe_models.files.ansys.full import read_full
+from fe_models.files.ansys.sub import SCALAR, read_sub
 
 DATA = Path(__file__).parent / "data" / "ansys"
 FULL, SUB = DATA / "HexBeam_clamped.full", DATA / "cp56.sub"

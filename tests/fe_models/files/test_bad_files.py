@@ -277,7 +277,9 @@ def test_cell_on_a_node_that_is_not_there_is_refused(tmp_path):
         tmp_path, "rod.msh", MSH22.replace("1 2 3 4\n$End", "1 2 3 9\n$End")
     )
     assert "names a node" in refusal(tmp_path, "rod.inp", TETRA.replace("1, 1, 2, 3, 4", "1, 1, 2, 3, 9"))
-    assert "CTETRA 1 names grid point 9, which is not defined" in refusal(tmp_path, "rod.bdf", BULK.replace("1,2,3,4\n", "1,2,3,9\n"))
+    assert "CTETRA 1 names grid point 9, which is not defined" in refusal(
+        tmp_path, "rod.bdf", BULK.replace("1,2,3,4\n", "1,2,3,9\n")
+    )
 
 
 def test_cell_listed_twice_is_refused(tmp_path):

@@ -5,8 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from fe_models.errors import MeshError
-from fe_models.files.bulk_data.cards import read_cards
-from fe_models.files.bulk_data.coordinate_systems import read_grid_points
+from fe_models.files.nastran.bulk_data.cards import read_cards
+from fe_models.files.nastran.bulk_data.coordinate_systems import read_grid_points
 
 
 def points_of(text):

@@ -10,10 +10,10 @@ from pyyeti.nastran import bulk
 from pyyeti.nastran import op2 as pyyeti_op2
 
 from fe_models.errors import MatrixError, MeshError
-from fe_models.files.bulk_data.cards import read_cards
-from fe_models.files.matrices.nastran import dmig_matrices
-from fe_models.files.nastran_matrices.dti import SCALAR
-from fe_models.files.nastran_matrices.op2 import read_op2
+from fe_models.files.nastran.bulk_data.cards import read_cards
+from fe_models.files.nastran.matrices.dti import SCALAR
+from fe_models.files.nastran.matrices.op2 import read_op2
+from fe_models.files.nastran.matrices.parts import dmig_matrices
 
 DATA = Path(__file__).parent / "data" / "nastran"
 HEAD = "DMIG,K,0,6,2,0\n"

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fe_models.errors import MatrixError
-from fe_models.files.bulk_data.cards import read_cards
-from fe_models.files.nastran_matrices.dti import EMPTY, SCALAR, element_rows, grid_rows
+from fe_models.files.nastran.bulk_data.cards import read_cards
+from fe_models.files.nastran.matrices.dti import EMPTY, SCALAR, element_rows, grid_rows
 
 
 def cards(table, *entries):

@@ -11,9 +11,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from pyyeti.nastran import op4 as pyyeti_op4
 
 from fe_models.errors import MatrixError
-from fe_models.files.nastran_matrices.op4 import is_op4, read_op4
-from fe_models.files.nastran_matrices.raw_matrix import matrix_named, real_square
-from fe_models.files.nastran_matrices.write_op4 import write_op4
+from fe_models.files.nastran.matrices.op4 import is_op4, read_op4
+from fe_models.files.nastran.matrices.raw_matrix import matrix_named, real_square
+from fe_models.files.nastran.matrices.write_op4 import write_op4
 
 DATA = Path(__file__).parent / "data" / "nastran"
 FILES = sorted(path.name for path in DATA.glob("*.op4"))

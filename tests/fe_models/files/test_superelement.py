@@ -12,11 +12,11 @@ from fe_models import UNIT_SYSTEMS, beam_body
 from fe_models.beams import BeamProperty, GeneralSection
 from fe_models.body.material import Material
 from fe_models.errors import MatrixError, MeshError
-from fe_models.files.bulk_data.cards import read_cards
-from fe_models.files.bulk_data.coordinate_systems import read_grid_points
-from fe_models.files.nastran_matrices.op4 import read_op4
-from fe_models.files.nastran_matrices.superelement import SCALAR, read_superelement
-from fe_models.files.nastran_matrices.write_op4 import write_op4
+from fe_models.files.nastran.bulk_data.cards import read_cards
+from fe_models.files.nastran.bulk_data.coordinate_systems import read_grid_points
+from fe_models.files.nastran.matrices.op4 import read_op4
+from fe_models.files.nastran.matrices.superelement import SCALAR, read_superelement
+from fe_models.files.nastran.matrices.write_op4 import write_op4
 from fe_models.meshes.line_mesh import LineMesh
 
 DATA = Path(__file__).parent / "data" / "nastran"

@@ -1,6 +1,6 @@
 """Every parameter of every keyword of Abaqus that is read: it changes the body, or is refused if it is not the default.
 
-The table is `fe_models.files.decks.abaqus.keywords.PARAMETERS`; a parameter that is read without a line here fails.
+The table is `fe_models.files.abaqus.keywords.PARAMETERS`; a parameter that is read without a line here fails.
 """
 
 import re
@@ -11,7 +11,7 @@ import pytest
 from cms.jobs.body_of_job import uncoupled_body
 from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
-from fe_models.files.decks.abaqus.keywords import HARMLESS, PARAMETERS, parameters_of
+from fe_models.files.abaqus.keywords import HARMLESS, PARAMETERS, parameters_of
 from fe_models.files.decks.model_of_deck import DeckOptions
 from fe_models.files.decks.read_deck import parse_deck
 from fe_models.foundation.stages import Stages

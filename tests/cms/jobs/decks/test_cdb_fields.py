@@ -1,6 +1,6 @@
 """Every field of every command of ANSYS that is read: it changes the body, or is refused if it is not the default.
 
-The table is `fe_models.files.decks.ansys.command_fields.COMMANDS`; a field that is read without a line here fails.
+The table is `fe_models.files.ansys.command_fields.COMMANDS`; a field that is read without a line here fails.
 """
 
 import numpy as np
@@ -9,7 +9,7 @@ import pytest
 from cms.jobs.body_of_job import uncoupled_body
 from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
-from fe_models.files.decks.ansys.command_fields import COLUMNS, COMMANDS, HARMLESS, fields_of_command
+from fe_models.files.ansys.command_fields import COLUMNS, COMMANDS, HARMLESS, fields_of_command
 from fe_models.files.decks.field_table import parse_fields
 from fe_models.files.decks.model_of_deck import DeckOptions
 from fe_models.files.decks.read_deck import parse_deck

@@ -1,6 +1,6 @@
 """Every field of every card of Nastran that is read: it changes the body, or another value than its default is refused.
 
-The table is `fe_models.files.decks.nastran.card_fields.CARDS`; a field that is read without a line here fails.
+The table is `fe_models.files.nastran.deck.card_fields.CARDS`; a field that is read without a line here fails.
 """
 
 import numpy as np
@@ -10,8 +10,8 @@ from cms.jobs.body_of_job import uncoupled_body
 from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
 from fe_models.files.decks.model_of_deck import DeckOptions
-from fe_models.files.decks.nastran.card_fields import CARDS, HARMLESS, fields_of
 from fe_models.files.decks.read_deck import parse_deck
+from fe_models.files.nastran.deck.card_fields import CARDS, HARMLESS, fields_of
 from fe_models.foundation.stages import Stages
 
 GRIDS = "\n".join(

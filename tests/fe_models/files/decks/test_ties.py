@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from fe_models.files.decks.abaqus.couplings import _foot
+from fe_models.files.abaqus.couplings import _foot
 from fe_models.meshes.cell_shapes import shape_values
 
 TURN = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]

@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from fe_models.errors import MatrixError
 from fe_models.files import read_matrices
-from fe_models.files.nastran_matrices.superelement import read_superelement
-from fe_models.files.nastran_matrices.write_op4 import write_op4
+from fe_models.files.nastran.matrices.superelement import read_superelement
+from fe_models.files.nastran.matrices.write_op4 import write_op4
 
 DATA = Path(__file__).parent.parent / "data" / "nastran"
 

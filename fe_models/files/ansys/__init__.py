@@ -1,0 +1,1 @@
+"""Files of ANSYS: whole decks (.cdb), and matrices and superelements (.full, .sub)."""

@@ -1,1 +1,0 @@
-"""Matrices and superelements of ANSYS: binary .full and .sub files."""

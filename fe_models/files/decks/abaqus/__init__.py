@@ -1,1 +1,0 @@
-"""Whole decks of Abaqus and CalculiX: one module for each kind of block; all add to one draft."""
