@@ -140,8 +140,8 @@ def reduce_deck(
     >>> body = cms.reduce_deck("arm.bdf", units="mm-t-s", reduction={"set": "rubin", "n_modes": 20})  # doctest: +SKIP
     """
     from cms.jobs.decks.job_text import job_tables
-    from fe_models.files.decks.model_of_deck import DeckOptions
-    from fe_models.files.decks.read_deck import parse_deck
+    from fe_models.files.model_of_deck import DeckOptions
+    from fe_models.files.read_deck import parse_deck
 
     deck = parse_deck(path, program=program)
     tables = job_tables(deck, DeckOptions(units, densities or {}, tuple(leave_out), mass), str(Path(path).resolve()))

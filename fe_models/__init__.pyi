@@ -22,7 +22,7 @@ from .elements.interfaces import distributing_interface as distributing_interfac
 from .elements.interfaces import rigid_interface as rigid_interface
 from .elements.shells.body import shell_body as shell_body
 from .elements.solids.body import solid_body as solid_body
-from .files.decks.model_of_deck import read_deck as read_deck
+from .files.model_of_deck import read_deck as read_deck
 from .files.read_mesh import read_mesh as read_mesh
 from .foundation.units import UNIT_SYSTEMS as UNIT_SYSTEMS
 from .foundation.units import Units as Units

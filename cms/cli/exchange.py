@@ -15,8 +15,8 @@ from cms.errors import ExportError, ForeignBodyError, JobError, ModalFileError, 
 from cms.exchange.export import WRITERS, export_body, unknown_format
 from cms.exchange.import_body import BODY_FORMATS, REDUCED_MATRICES
 from fe_models.files.cad.cad_units import GEOMETRIES
-from fe_models.files.decks.read_deck import DECKS
-from fe_models.files.matrices.read_matrices import MATRIX_FORMATS
+from fe_models.files.read_deck import DECKS
+from fe_models.files.read_matrices import MATRIX_FORMATS
 from fe_models.files.read_mesh import MESHES
 from fe_models.foundation.formats import Format
 from fe_models.foundation.units import UNIT_SYSTEMS
@@ -249,7 +249,7 @@ def interfaces_of(words: tuple[str, ...]) -> dict[str, list[int]] | None:
 def inertia_of(request: ImportRequest) -> "Inertia | None":
     """Return the additional inertia data: one of full mass, nodal masses, or mesh and density."""
     from cms.exchange.importers.inertia import MeshMass, NodalMasses, full_mass_of
-    from fe_models.files.matrices.read_matrices import read_matrices
+    from fe_models.files.read_matrices import read_matrices
     from fe_models.files.read_mesh import read_mesh
 
     given = [bool(request.full_mass), request.nodal_masses is not None, request.mesh is not None]

@@ -8,7 +8,7 @@ from cms.cli.console import output_path, print_table, say
 from cms.errors import JobError
 from cms.jobs.decks.job_text import job_text
 from fe_models.assembly.model import MASSES_OF_ALL
-from fe_models.files.decks.model_of_deck import DeckOptions
+from fe_models.files.model_of_deck import DeckOptions
 from fe_models.foundation.units import UNIT_SYSTEMS
 from fe_models.foundation.words import nearest, quoted
 
@@ -30,7 +30,7 @@ class DeckRequest:
 
 def write_job(request: DeckRequest) -> None:
     """Read the deck, print which cards are not converted, and write the job."""
-    from fe_models.files.decks.read_deck import parse_deck
+    from fe_models.files.read_deck import parse_deck
 
     if request.units is None or request.units not in UNIT_SYSTEMS:
         what = "missing; a deck does not say its units" if request.units is None else f"unknown {quoted(request.units)}"

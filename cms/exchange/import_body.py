@@ -23,7 +23,7 @@ from cms.reduction.basis.frames import Frame
 from fe_models.errors import FeModelsError
 from fe_models.files.matrices.body import numbers_of
 from fe_models.files.matrices.foreign_matrices import SCALAR, ForeignMatrices
-from fe_models.files.matrices.read_matrices import read_matrices
+from fe_models.files.read_matrices import read_matrices
 from fe_models.files.read_mesh import read_geometry
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.digest import file_digest

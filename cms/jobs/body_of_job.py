@@ -41,7 +41,7 @@ def model_of_job(job: Job, stages: Stages, source: "Mesh | Deck | None" = None) 
     """
     name, units, accept = str(job.body.name), UNIT_SYSTEMS[job.body.units], job.body.accept
     if job.body.deck is not None:
-        from fe_models.files.decks.read_deck import parse_deck
+        from fe_models.files.read_deck import parse_deck
 
         with stages("read deck"):
             deck: Any = source or parse_deck(job.body.deck, program=job.body.program)
@@ -174,7 +174,7 @@ def body_of_matrices(job: Job, stages: Stages, on_report: Callable[[Any], None] 
     if job.body.brings_interfaces:
         return body_with_its_interfaces(job, stages)
     from fe_models.files.matrices.body import MatrixReport, body_from_foreign, nodes_of, with_geometry
-    from fe_models.files.matrices.read_matrices import read_matrices
+    from fe_models.files.read_matrices import read_matrices
     from fe_models.files.read_mesh import read_geometry
 
     if job.body.matrices is None:

@@ -155,7 +155,7 @@ def read_geometry(path: str | Path) -> Mesh | NodeCloud:
     MeshError
         As for `read_mesh`, but elements may be of any kind.
     """
-    from fe_models.files.decks.read_deck import DECK_FORMATS, parse_deck
+    from fe_models.files.read_deck import DECK_FORMATS, parse_deck
 
     path = Path(path)
     suffix = path.suffix.lower()

@@ -15,8 +15,8 @@ from scipy.spatial.transform import Rotation
 from cms.jobs.body_of_job import uncoupled_body
 from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
-from fe_models.files.decks.model_of_deck import DeckOptions
-from fe_models.files.decks.read_deck import parse_deck
+from fe_models.files.model_of_deck import DeckOptions
+from fe_models.files.read_deck import parse_deck
 from fe_models.foundation.stages import Stages
 from tests.campaign.deck_bodies import Expected, words, wrong_body
 from tests.campaign.verdict import ACCEPTED, REFUSED, WRONG, Verdict

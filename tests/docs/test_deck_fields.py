@@ -1,9 +1,9 @@
 """The page of the fields of decks is written from the tables that drive the readers."""
 
-from fe_models.files.decks.field_pages import field_tables
+from fe_models.files.field_pages import field_tables
 from tests.root import ROOT
 
-AGAIN = "write it again: fe_models.files.decks.field_pages.field_tables()"
+AGAIN = "write it again: fe_models.files.field_pages.field_tables()"
 
 
 def test_the_page_of_deck_fields_is_that_of_the_tables():

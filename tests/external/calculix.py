@@ -19,8 +19,8 @@ from scipy.sparse.linalg import eigsh, spsolve
 from cms.jobs.body_of_job import uncoupled_body
 from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
-from fe_models.files.decks.model_of_deck import DeckOptions
-from fe_models.files.decks.read_deck import parse_deck
+from fe_models.files.model_of_deck import DeckOptions
+from fe_models.files.read_deck import parse_deck
 from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.stages import Stages
 

@@ -37,8 +37,8 @@ from fe_models.assembly.tables.materials import solid_properties
 from fe_models.body.fe_body import FEBody
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.errors import FeModelsError
-from fe_models.files.decks.model_of_deck import DeckOptions, model_of_deck
-from fe_models.files.decks.read_deck import parse_deck
+from fe_models.files.model_of_deck import DeckOptions, model_of_deck
+from fe_models.files.read_deck import parse_deck
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.stages import Stages
 from fe_models.foundation.units import UNIT_SYSTEMS

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.files.decks.deck import Deck
-from fe_models.files.decks.model_of_deck import DeckOptions, deck_tables
+from fe_models.files.model_of_deck import DeckOptions, deck_tables
 from fe_models.foundation.arrays import MOTION_COMPONENTS
 
 __all__ = ["job_tables", "job_text", "toml_text"]
@@ -32,7 +32,7 @@ def job_tables(deck: Deck, options: DeckOptions, deck_path: str) -> dict[str, An
     Raises
     ------
     MeshError
-        As `fe_models.files.decks.model_of_deck.deck_tables`.
+        As `fe_models.files.model_of_deck.deck_tables`.
     """
     tables = deck_tables(deck, options)
     name, *others = tables["body"].items()

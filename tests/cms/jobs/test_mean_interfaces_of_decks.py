@@ -9,8 +9,8 @@ from cms.errors import BodyError
 from cms.jobs.decks.job_text import job_text
 from fe_models.body.fe_body import Interface
 from fe_models.elements.solids.body import solid_body
-from fe_models.files.decks.model_of_deck import DeckOptions
-from fe_models.files.decks.read_deck import parse_deck
+from fe_models.files.model_of_deck import DeckOptions
+from fe_models.files.read_deck import parse_deck
 from tests.bodies import STEEL, box_mesh
 
 BOX = box_mesh(3, 1, 1, 1.0, 0.1, 0.1)

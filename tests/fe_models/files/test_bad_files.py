@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from fe_models import read_mesh
 from fe_models.errors import MeshError
-from fe_models.files.decks.read_deck import parse_deck
+from fe_models.files.read_deck import parse_deck
 from fe_models.files.read_mesh import MESH_FORMATS, read_line_mesh
 from tests.fe_models.small_meshes import faced_box, nastran_deck
 

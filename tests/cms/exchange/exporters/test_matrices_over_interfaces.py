@@ -207,7 +207,7 @@ def test_superelements_come_back_with_their_frequencies(to, reduced, tmp_path):
 
 def test_a_user_element_of_abaqus_holds_dofs_and_triangles(reduced, model, tmp_path):
     """The reader of substructures of Abaqus and CalculiX: modes are dof 1 of nodes of their own."""
-    from fe_models.files.matrices.read_matrices import read_matrices
+    from fe_models.files.read_matrices import read_matrices
 
     export(reduced, tmp_path, "bar.inp", "abaqus")
     (tmp_path / "bar.inp").rename(tmp_path / "bar.mtx")

@@ -20,8 +20,8 @@ from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
 from fe_models.body.fe_body import Interface
 from fe_models.elements.solids.body import solid_body
-from fe_models.files.decks.model_of_deck import DeckOptions
-from fe_models.files.decks.read_deck import parse_deck
+from fe_models.files.model_of_deck import DeckOptions
+from fe_models.files.read_deck import parse_deck
 from fe_models.files.read_mesh import read_mesh
 from fe_models.foundation.units import unit_system
 from tests.bodies import STEEL, box_mesh

@@ -208,7 +208,7 @@ def test_a_table_of_nodal_masses_completes_a_superelement(outboard, tmp_path):
 
 def test_a_superelement_of_ansys_has_its_mass_and_the_frequencies_of_its_matrices():
     """A cube of 30 mm with a density in kg/m³: its numbers are those of metres, and another system is refused."""
-    from fe_models.files.matrices.read_matrices import read_matrices
+    from fe_models.files.read_matrices import read_matrices
 
     path = ROOT / "tests" / "fe_models" / "files" / "data" / "ansys" / "cp56.sub"
     body = cms.exchange.import_body(path, units="m-kg-s")

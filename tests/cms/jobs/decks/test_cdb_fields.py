@@ -11,8 +11,8 @@ from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import read_job
 from fe_models.files.ansys.command_fields import COLUMNS, COMMANDS, HARMLESS, fields_of_command
 from fe_models.files.decks.field_table import parse_fields
-from fe_models.files.decks.model_of_deck import DeckOptions
-from fe_models.files.decks.read_deck import parse_deck
+from fe_models.files.model_of_deck import DeckOptions
+from fe_models.files.read_deck import parse_deck
 from fe_models.foundation.stages import Stages
 
 CORNERS = [(0, 0, 0), (2, 0, 0.1), (2.1, 1, 0), (0, 1.2, 0), (0.1, 0, 1), (2, 0.1, 1), (2, 1, 1.1), (0, 1, 1)]

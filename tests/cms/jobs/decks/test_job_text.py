@@ -15,8 +15,8 @@ from cms.jobs.decks.job_text import job_text
 from cms.jobs.job import ReductionSection, read_job
 from fe_models.elements.solids.body import solid_body
 from fe_models.errors import MeshError
-from fe_models.files.decks.model_of_deck import DeckOptions
-from fe_models.files.decks.read_deck import parse_deck
+from fe_models.files.model_of_deck import DeckOptions
+from fe_models.files.read_deck import parse_deck
 from fe_models.foundation.stages import Stages
 from tests.bodies import STEEL, box_mesh
 from tests.decks import write_deck

@@ -12,8 +12,8 @@ from fe_models.elements.shells.body import shell_body
 from fe_models.elements.shells.laminate import shell_law
 from fe_models.elements.shells.shell_property import LaminateProperty, Layer, StiffnessProperty
 from fe_models.errors import MeshError
-from fe_models.files.decks.model_of_deck import DeckOptions
-from fe_models.files.decks.read_deck import parse_deck
+from fe_models.files.model_of_deck import DeckOptions
+from fe_models.files.read_deck import parse_deck
 from fe_models.foundation.stages import Stages
 from fe_models.foundation.units import unit_system
 from fe_models.meshes.shell_mesh import ShellMesh

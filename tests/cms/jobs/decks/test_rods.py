@@ -11,8 +11,8 @@ from cms.jobs.job import read_job
 from fe_models.assembly.rods import Rod, rod_body
 from fe_models.body.material import Material
 from fe_models.errors import MeshError
-from fe_models.files.decks.model_of_deck import DeckOptions
-from fe_models.files.decks.read_deck import parse_deck
+from fe_models.files.model_of_deck import DeckOptions
+from fe_models.files.read_deck import parse_deck
 from fe_models.foundation.errors import BodyError
 from fe_models.foundation.stages import Stages
 from fe_models.foundation.units import unit_system

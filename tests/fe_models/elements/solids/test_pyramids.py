@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from fe_models import solid_body, unit_system
 from fe_models.checks.mesh_report import report_mesh
-from fe_models.files.decks.read_deck import parse_deck
+from fe_models.files.read_deck import parse_deck
 from fe_models.files.read_mesh import read_mesh
 from fe_models.meshes.boundary import boundary_nodes
 from fe_models.meshes.mesh import Mesh

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from fe_models.elements.beams.sections import Circle
 from fe_models.errors import MeshError
 from fe_models.files.decks.deck import DeckMaterial, LineSection, ShellSection, SolidSection
-from fe_models.files.decks.read_deck import parse_deck
+from fe_models.files.read_deck import parse_deck
 from tests.bodies import box_mesh
 from tests.decks import write_deck
 

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from fe_models.files.decks.deck_images import Motion, moved_deck
 from fe_models.files.decks.ledger import Ledger
-from fe_models.files.decks.read_deck import parse_deck
+from fe_models.files.read_deck import parse_deck
 
 DECK = """BEGIN BULK
 CORD2R,5,,0.,0.,0.,.3,.2,1.

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from fe_models.elements.beams.sections import BoxSection
 from fe_models.errors import MeshError
 from fe_models.files.abaqus.uneven_box import uneven_box
-from fe_models.files.decks.read_deck import parse_deck
+from fe_models.files.read_deck import parse_deck
 
 KEYS = {"area": "A", "iy": "Iy", "iz": "Iz", "torsion": "J", "shear_area_y": "A_sy", "shear_area_z": "A_sz"}
 

@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import fe_models
 import fe_models.files.matrices.body
 from fe_models.errors import BodyError, MatrixError
-from fe_models.files.matrices.read_matrices import in_basic_axes
+from fe_models.files.read_matrices import in_basic_axes
 from fe_models.meshes.cell_shapes import shape_values
 
 DATA = Path(__file__).parent / "data" / "abaqus"

@@ -10,7 +10,7 @@ import numpy as np
 from fe_models.assembly.model import FEModel
 from fe_models.errors import MeshError
 from fe_models.files.decks.deck import Deck, LineSection, RodSection, ShellSection, SolidSection, Support
-from fe_models.files.decks.read_deck import parse_deck
+from fe_models.files.read_deck import parse_deck
 from fe_models.foundation.arrays import MOTION_COMPONENTS
 from fe_models.foundation.words import nearest, quoted
 
