@@ -1,6 +1,7 @@
 """Kinds of files, with the command that runs each and the class that describes its tables."""
 
-from typing import NamedTuple
+from importlib import import_module
+from typing import Any, NamedTuple
 
 __all__ = ["KINDS", "FileKind"]
 
@@ -11,6 +12,11 @@ class FileKind(NamedTuple):
     command: str  #: command that runs files of this kind
     model: str  #: class that describes its tables, as "module:class"
     is_parametric: bool = False  #: whether it may have parameters, base files and repeated tables
+
+    def table_class(self) -> Any:
+        """Return the class that describes its tables."""
+        module, _, name = self.model.partition(":")
+        return getattr(import_module(module), name)
 
 
 KINDS = {

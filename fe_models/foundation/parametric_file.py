@@ -19,7 +19,6 @@ import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib import import_module
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -143,8 +142,7 @@ SCHEMA_LINE = re.compile(rb"#:schema (?:\.\./)*([a-z]+)\.schema\.json\r?\n")
 
 def schema_text(kind: str) -> str:
     """Return the JSON schema of a kind of file, one of `KINDS`."""
-    module, _, name = KINDS[kind].model.partition(":")
-    schema = json_schema(getattr(import_module(module), name), is_parametric=KINDS[kind].is_parametric)
+    schema = json_schema(KINDS[kind].table_class(), is_parametric=KINDS[kind].is_parametric)
     return json.dumps(schema, indent=2) + "\n"
 
 

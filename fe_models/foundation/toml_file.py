@@ -142,7 +142,8 @@ def validated(
 ) -> Model:
     """Return the validated model; raise `error` that lists every problem on a line of its own.
 
-    A file that states another `kind` is refused in one line with the command for that kind.
+    A file that states another `kind`, or states none and has the tables of another kind, is refused in one line with
+    the command for that kind.
     """
     kind, expected = data.get("kind"), model.model_fields.get("kind")
     if kind is not None and expected is not None and kind != expected.default:
@@ -155,6 +156,11 @@ def validated(
     try:
         return model.model_validate(data, context=context)
     except ValidationError as problem:
+        if kind is None and expected is not None and (other := kind_by_tables(data, model)):
+            raise error(
+                f'{path}: expected a file of kind "{expected.default}", but its tables are those of kind "{other}"; '
+                f"run it by {KINDS[other].command} {path.name}"
+            ) from None
         details = problem.errors(include_url=False)
         place = data.place if isinstance(data, FileContent) else lambda location: ""
         problems = [f"{describe(model, detail, data)}{place(detail['loc'])}" for detail in details[:MOST_PROBLEMS]]
@@ -164,6 +170,17 @@ def validated(
     if n > MOST_PROBLEMS:
         problems.append(f"... and {n - MOST_PROBLEMS} more")
     raise error("\n".join([f"{path}: {n} problems:", *(f"  {text}" for text in problems)]))
+
+
+def kind_by_tables(data: Mapping[str, Any], model: type[BaseModel]) -> str:
+    """Return the kind to which all keys of a file without `kind` belong, if it has no required key of the model."""
+    if any(field.is_required() and name in data for name, field in model.model_fields.items()):
+        return ""
+    for name, kind in KINDS.items():
+        fields = kind.table_class().model_fields
+        if data.keys() <= fields.keys() and all(key in data for key, field in fields.items() if field.is_required()):
+            return name
+    return ""
 
 
 def files_named(value: Any) -> tuple[Path, ...]:

@@ -197,6 +197,17 @@ def test_a_file_of_another_kind_is_refused_with_its_command(folder):
     assert 'expected a file of kind "job"; run this one by floatframe run cart.toml' in result.stderr
 
 
+def test_a_file_without_kind_but_with_tables_of_another_is_refused_with_its_command(folder):
+    """No key of the file belongs to a job; one required table is enough for the list of problems."""
+    (folder / "cart.toml").write_text(CART)
+    result = CliRunner().invoke(cms_app, ["reduce", str(folder / "cart.toml")])
+    assert result.exit_code == 2
+    assert result.stderr.count("\n") == 1
+    assert 'its tables are those of kind "system"; run it by floatframe run cart.toml' in result.stderr
+    (folder / "cart.toml").write_text(CART + "\n[reduction]\n")
+    assert "problems:" in CliRunner().invoke(cms_app, ["reduce", str(folder / "cart.toml")]).stderr
+
+
 def test_an_unknown_kind_is_refused_with_the_nearest(folder):
     (folder / "cart.toml").write_text('kind = "sytem"\n' + CART)
     result = CliRunner().invoke(app, ["run", str(folder / "cart.toml")])
