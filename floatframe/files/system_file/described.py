@@ -8,18 +8,27 @@ import inspect
 import logging
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, Field, dataclass, field, fields
+from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
 from functools import cache
-from types import NoneType, UnionType
+from pathlib import Path
+from types import GenericAlias, NoneType, UnionType
 from typing import Annotated, Any, ClassVar, Literal, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 import pydantic
-from pydantic import ConfigDict, PlainValidator, TypeAdapter, ValidationError, ValidationInfo, create_model
+from pydantic import (
+    BeforeValidator,
+    ConfigDict,
+    PlainValidator,
+    TypeAdapter,
+    ValidationError,
+    ValidationInfo,
+    create_model,
+)
 from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
 
 from cms.body.address import Address
-from fe_models.foundation.toml_file import Matrix3, Table, choice, is_no_number
+from fe_models.foundation.toml_file import Matrix3, Table, choice, existing_file, is_no_number
 from floatframe.errors import ModelError, SignalError
 from floatframe.files.system_file.coordinate_section import CoordinateSection, NamedCoordinate
 from floatframe.files.system_file.keys import Name
@@ -37,18 +46,40 @@ from floatframe.model.bodies.coordinates import JointCoordinateName
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.functions.time_functions import TimeFunction
 
-__all__ = ["DescribedSection", "OneOf", "Signals"]
+__all__ = ["DescribedSection", "OneOf", "Signals", "fields_table_of", "key_of", "python_value"]
 
 log = logging.getLogger(__name__)
 
 Signals = Mapping[str, SignalFunction] | None  #: signals of a system file, by name
 
 
-class DescribedSection(Table):
+class FieldsTable(Table):
     """A table whose keys are the fields of a class."""
 
     model_config = ConfigDict(protected_namespaces=())
     described: ClassVar[Any]  #: the class
+
+    def object_with(self, signals: Signals, **given: Any) -> Any:
+        """Return the object of the table; fields that are no keys are passed as `given`."""
+        values = {
+            key: python_value(getattr(self, key), signals)
+            for key in type(self).model_fields
+            if key in self.model_fields_set
+        }
+        return self.described(**given, **values)
+
+
+class MarkerSection(Table):
+    """A table that describes a marker."""
+
+    body: Name = pydantic.Field(description='the name of a body, or "ground"')
+    marker: PlaceOnBody | None = pydantic.Field(None, description="an interface, or a position [x, y, z] in the body")
+    triad: Matrix3 | None = pydantic.Field(None, description="the axes of the marker, [x axis, y axis, z axis]")
+
+
+class DescribedSection(FieldsTable):
+    """A table that describes an object; a marker has keys for its body, its place and its axes."""
+
     is_measured: ClassVar[bool]  #: whether its places may be nodes, elements and sets of a mesh
     type: Any
 
@@ -94,9 +125,13 @@ def python_value(value: Any, signals: Signals) -> Any:
         return value.function(signals)
     if isinstance(value, CoordinateSection):
         return value.found()
+    if isinstance(value, MarkerSection):
+        return marker_of(value.body, value.marker, value.triad)
+    if isinstance(value, FieldsTable):
+        return value.object_with(signals)
     if isinstance(value, dict):
         return {key: python_value(each, signals) for key, each in value.items()}
-    return value
+    return tuple(python_value(each, signals) for each in value) if isinstance(value, list | tuple) else value
 
 
 # keys of a class ------------------------------------------------------------------------------------------------------
@@ -158,6 +193,17 @@ def fields_of_marker(name: str, meaning: str, *, is_measured: bool, is_needed: b
     return found
 
 
+def fields_of_value(name: str, hint: Any, meaning: str, *, is_needed: bool) -> dict[str, Any]:
+    """Return the key of a field with its type and description; none if a file cannot give its value."""
+    key = key_of(hint)
+    if key is None:
+        return {}
+    text = ": ".join(filter(None, (key.meaning, meaning)))
+    if is_needed:
+        return {name: (key.type, pydantic.Field(description=text))}
+    return {name: (key.type | None, pydantic.Field(None, description=text))}
+
+
 def meanings_of(kind: Any) -> dict[str, str]:
     """Return the descriptions of the fields in the docstring of a class."""
     _, _, listed = (inspect.getdoc(kind) or "").partition("Parameters\n----------\n")
@@ -189,16 +235,31 @@ def section_of(name: str, kind: Any, place: str, stated: tuple[type, ...], is_me
         default = each.default if each.default_factory is MISSING else each.default_factory()
         if is_marker(each.name, hint):
             keys |= fields_of_marker(each.name, meaning, is_measured=is_measured, is_needed=default is MISSING)
-        elif not is_named(hint, name) and (key := key_of(hint)) is not None:
-            text = ": ".join(filter(None, (key.meaning, meaning)))
-            if default is MISSING or isinstance(default, stated):
-                keys[each.name] = (key.type, pydantic.Field(description=text))
-            else:
-                keys[each.name] = (key.type | None, pydantic.Field(None, description=text))
+        elif not is_named(hint, name):
+            keys |= fields_of_value(
+                each.name, hint, meaning, is_needed=default is MISSING or isinstance(default, stated)
+            )
     summary = (inspect.getdoc(kind) or "").partition("\n\n")[0]
     told = f'[{place}] of type "{name}": {summary}'
     model = create_model(kind.__name__, __base__=DescribedSection, __doc__=told, __cls_kwargs__={"title": name}, **keys)
     model.described, model.is_measured = kind, is_measured
+    return model
+
+
+@cache
+def fields_table_of(kind: Any, left_out: tuple[str, ...] = ()) -> type[FieldsTable]:
+    """Return the model of the tables whose keys are the fields of a dataclass, without those that are left out."""
+    meanings = meanings_of(kind)
+    keys: dict[str, Any] = {}
+    for each in fields(kind):
+        if each.init and each.name not in left_out:
+            is_needed = each.default is MISSING and each.default_factory is MISSING
+            keys |= fields_of_value(
+                each.name, hints_of(kind)[each.name], meanings.get(each.name, ""), is_needed=is_needed
+            )
+    summary = (inspect.getdoc(kind) or "").partition("\n\n")[0]
+    model = create_model(kind.__name__, __base__=FieldsTable, __doc__=summary, **keys)
+    model.described = kind
     return model
 
 
@@ -224,13 +285,22 @@ def key_of(hint: Any) -> Key | None:
         others = {NoneType} | ({str} if JointCoordinateName in within else set())
         keys = list(dict.fromkeys(key for each in within if each not in others and (key := key_of(each)) is not None))
         return keys[0] if len(keys) == 1 else either(keys) if keys else None
-    inner = key_of(within[-1]) if isinstance(origin, type) and issubclass(origin, Mapping | Sequence) else None
-    if inner is not None:
-        held = inner.type
-        if issubclass(origin, Mapping):
-            return Key(dict[str, held], f"a table, each value of it {inner.meaning}")  # type: ignore[valid-type]
-        return Key(list[held], f"a list, each of it {inner.meaning}")  # type: ignore[valid-type]
-    return None
+    if isinstance(hint, type) and is_dataclass(hint):
+        return Key(fields_table_of(hint), f"a table of a {hint.__name__}")
+    parts: list[Any] = [key_of(each) for each in within if each is not Ellipsis]
+    if not isinstance(origin, type) or None in parts or not parts:
+        return None
+    kinds, meaning = tuple(part.type for part in parts), parts[-1].meaning
+    if issubclass(origin, Mapping):
+        return Key(GenericAlias(dict, kinds), f"a table, each value of it {meaning}")
+    if origin is tuple and Ellipsis not in within:
+        return Key(Annotated[GenericAlias(tuple, kinds), BeforeValidator(items_of)], f"a list of {len(kinds)}")
+    return Key(GenericAlias(list, kinds), f"a list, each of it {meaning}") if issubclass(origin, Sequence) else None
+
+
+def items_of(value: Any) -> Any:
+    """Return a list as a tuple."""
+    return tuple(value) if isinstance(value, list) else value
 
 
 def either(keys: Sequence[Key]) -> Key:
@@ -262,6 +332,7 @@ def numbers_of_any_shape(value: Any) -> Any:
         raise ValueError("expected numbers, in lists of one length") from None
 
 
+ExistingFile = Annotated[Path, BeforeValidator(existing_file())]
 Numbers = list[float] | list[list[float]]
 #: what a file gives for the fields of a type
 KEYS: dict[Any, Key] = {
@@ -269,6 +340,9 @@ KEYS: dict[Any, Key] = {
     int: Key(int, "a whole number"),
     bool: Key(bool, "true or false"),
     str: Key(str, "text"),
+    Any: Key(Any, "a value"),
+    Path: Key(ExistingFile, "the path of a file"),
+    Marker: Key(MarkerSection, 'a marker, {body = "NAME", marker = "INTERFACE" or [x, y, z]}'),
     TimeFunction: Key(MotionSection, "the table of a function"),
     JointCoordinateName: Key(NamedCoordinate, '"JOINT.COORDINATE" or a table of a coordinate'),
     Address: Key(NodeOrPosition, "a position [x, y, z] in the body, or {node = 12}"),

@@ -233,8 +233,9 @@ def read_system(
         for hint in unit_hints(system):
             log.warning("%s: %s", path, hint)
     except (FloatframeError, CmsError) as error:
-        found = re.match(rf"({'|'.join(TABLES)}) '([^']*)'", str(error))
-        line = "" if found is None else content.place((TABLES[found[1]], found[2]))
+        named = re.match(rf"({'|'.join(TABLES)}) '([^']*)'", str(error))
+        keys = str(error).partition(":")[0].partition(" = ")[0].split(".")
+        line = content.place((TABLES[named[1]], named[2]) if named else tuple(keys))
         raise SystemFileError(f"{path}: {error}{line}") from error
     if data.run is None:
         return system, None

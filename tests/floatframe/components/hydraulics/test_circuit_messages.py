@@ -185,7 +185,7 @@ def test_a_circuit_of_a_file_is_that_of_python(tmp_path):
             'type = "orifise"',
             "elements.lift.components.2.type: expected a component, got 'orifise'; did you mean 'orifice'",
         ),
-        ("head_area", "head_aria", "elements.lift.components.1: Cylinder has no key .head_aria."),
+        ("head_area", "head_aria", "elements.lift.components.1.head_aria: unknown key; did you mean .head_area."),
         ("area = 1.5e-5\n", "", "elements.lift.components.2.area: missing; expected a number"),
         ("ambient = 101325.0", "ambient = -1.0", "ambient: expected a number > 0, got -1"),
         (
