@@ -22,7 +22,7 @@ SOURCES = sorted(
     and not path.is_relative_to(ROOT / "docs" / "project")
     and not path.is_relative_to(ROOT / "docs" / "notebooks")
 ) + sorted(ROOT.glob("*.md"))
-PAGES = sorted(path for path in SOURCES if path.suffix == ".md" and path.name != "CHANGELOG.md")
+PAGES = sorted(path for path in SOURCES if path.suffix == ".md" and path.name not in {"CHANGELOG.md", "history.md"})
 HERE = ROOT / "tests" / "docs" / "test_references.py"
 
 
