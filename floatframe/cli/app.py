@@ -83,7 +83,7 @@ def run_command(
     """Compute the motion of a system.
 
     Without -o, the results are written next to the system file: swing.toml gives swing.h5. A file with another `kind`
-    (sweep, optimization, laboratory, shake, fatigue) is run by the command for it.
+    (sweep, optimization, laboratory, shake, fatigue) is run by the command for it; --set changes the system of a sweep.
 
     Example: floatframe run swing.toml -o swing.h5
 
@@ -99,9 +99,12 @@ def run_command(
 
     kind = read_toml(system, SystemFileError).get("kind", "system")
     if kind in OTHER_KINDS:
-        if set_values or formulation or watch:
-            raise SystemFileError(f"{system}: kind = {kind!r}: --set, --formulation and --watch belong to systems")
-        OTHER_KINDS[kind](system, **({} if output is None else {"outputs": [output]}))
+        if formulation or watch or (set_values and kind != "sweep"):
+            raise SystemFileError(
+                f"{system}: kind = {kind!r}: --formulation and --watch belong to systems, --set to systems and sweeps"
+            )
+        changes = {"set_values": set_values} if set_values else {}
+        OTHER_KINDS[kind](system, **changes, **({} if output is None else {"outputs": [output]}))
         return
     model, given = read_system(system, changes_of(set_values))
     analyses.tell_left_out(model)

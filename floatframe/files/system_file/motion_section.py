@@ -5,6 +5,7 @@ from dataclasses import replace
 from inspect import signature
 from typing import Any
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from fe_models.foundation.toml_file import Table, choice
@@ -14,7 +15,7 @@ from floatframe.files.system_file.keys import Name, Number, Numbers
 from floatframe.files.system_file.signal_section import SignalFunction, function_named
 from floatframe.model.functions.path_motions import rest_to_rest_spline
 from floatframe.model.functions.point_to_point import quintic, trapezoid
-from floatframe.model.functions.tables import INTERPOLATIONS, acceleration_table, interpolated
+from floatframe.model.functions.tables import INTERPOLATIONS, acceleration_table, interpolated, overshoot
 from floatframe.model.functions.time_functions import (
     TimeFunction,
     constant,
@@ -25,7 +26,7 @@ from floatframe.model.functions.time_functions import (
     smooth_step,
 )
 
-__all__ = ["TIME_FUNCTIONS", "MotionSection", "require_quantity"]
+__all__ = ["TIME_FUNCTIONS", "MotionSection", "overshoot_notes", "require_quantity"]
 
 
 def measured_signal(signal: TimeFunction, factor: float = 1.0) -> TimeFunction:
@@ -122,6 +123,26 @@ class MotionSection(Table):
         if self.signal is not None:
             given["signal"] = function_named(self.signal, signals or {}).function
         return make(**{key: value for key, value in given.items() if value is not None})
+
+
+OVERSHOOT = 0.1  #: largest overshoot of a table without a note, relative to the range of its values
+
+
+def overshoot_notes(section: Any, place: str = "") -> Iterator[str]:
+    """Yield a note on each table within a section whose spline, if none is chosen, leaves the range of its values."""
+    if isinstance(section, MotionSection) and section.type == "table" and section.interpolation is None:
+        t, values = np.array(section.t), np.array(section.values)
+        size, where = overshoot(section.function(), t, values)
+        if size > OVERSHOOT:
+            yield (
+                f"{place}: its cubic spline leaves the range of the values by {100 * size:.3g} % of it, at "
+                f'{where:.4g}; interpolation = "monotone" stays within, "cubic" ends this note'
+            )
+    inside = dict(section) if isinstance(section, Mapping | Table) else {}
+    if isinstance(section, list | tuple):
+        inside = {str(k): each for k, each in enumerate(section)}
+    for key, each in inside.items():
+        yield from overshoot_notes(each, f"{place}.{key}".removeprefix("."))
 
 
 def require_quantity(

@@ -48,6 +48,7 @@ from floatframe.files.system_file.connections import (
 from floatframe.files.system_file.controller_section import ControllerSection
 from floatframe.files.system_file.element_section import element_of
 from floatframe.files.system_file.keys import Name
+from floatframe.files.system_file.motion_section import overshoot_notes
 from floatframe.files.system_file.run_section import RunOptions, RunSection
 from floatframe.files.system_file.shape_section import ShapeSection
 from floatframe.files.system_file.signal_section import SignalSection, signal_functions
@@ -230,7 +231,7 @@ def read_system(
         for signal in signals.values():
             if signal.notes:
                 log.warning("%s: signal %s: %s", path, signal.name, "; ".join(signal.notes))
-        for hint in unit_hints(system):
+        for hint in (*overshoot_notes(data), *unit_hints(system)):
             log.warning("%s: %s", path, hint)
     except (FloatframeError, CmsError) as error:
         named = re.match(rf"({'|'.join(TABLES)}) '([^']*)'", str(error))

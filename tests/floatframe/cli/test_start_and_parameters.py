@@ -226,6 +226,10 @@ def test_run_runs_a_sweep_by_its_kind(folder):
     assert_allclose(rows[:, 0], [125.0, 500.0])
     assert_allclose(rows[1, 1] / rows[0, 1], 2.0, rtol=1e-6)
     assert result.exit_code == 0
+    (folder / "sweep.journal").unlink()  # of another system
+    run("run", folder / "sweep.toml", "-o", folder / "heavy.csv", "--set", "mass=8.0")
+    heavy = np.loadtxt(folder / "heavy.csv", delimiter=",", skiprows=1, usecols=(0, 1))
+    assert_allclose(heavy[:, 1], rows[:, 1] / 2.0, rtol=1e-6)
 
 
 @pytest.mark.parametrize("frame", [None, cms.NodalFrame("start")], ids=["mean", "nodal"])

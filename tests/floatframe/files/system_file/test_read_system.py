@@ -317,6 +317,22 @@ def test_forces_in_joints_and_tables_are_read(write):
     assert system.redundant == "minimum-norm"
 
 
+def test_a_table_whose_spline_overshoots_is_noted_unless_its_interpolation_is_chosen(write, caplog):
+    """A step at uneven times leaves its range by many times its size; a smooth table and a monotone one stay within."""
+    step = "[0, 0, 10, 10, 10]"
+    steps = FORCES.replace("t = [-1, 0, 1, 2]", "t = [0, 0.5, 0.52, 2, 5]").replace("[-5, 0, 1, 8]", step)
+    monotone = steps.replace(step, f'{step}\ninterpolation = "monotone"')
+    note = "forces.bump.characteristic: its cubic spline leaves the range"
+    for text, notes in ((FORCES, []), (steps, [note]), (monotone, [])):
+        caplog.clear()
+        system, _ = read_system(write(("[run]", text)))
+        found = [record.getMessage().split("swing.toml: ")[1] for record in caplog.records]
+        assert [note[: len(wanted)] for note, wanted in zip(found, notes, strict=True)] == notes
+        force = next(each for each in system.forces if getattr(each, "name", "") == "bump")
+        beyond = np.max(force.characteristic.at(np.linspace(0, 2, 400))) - 10
+        assert (beyond > 100) == bool(notes)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
