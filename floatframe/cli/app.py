@@ -388,7 +388,7 @@ def plot_command(
     """
     from cms.errors import CmsError
     from floatframe.errors import ResultsError
-    from floatframe.pictures.animation import bodies_of
+    from floatframe.pictures.animation import bodies_of, require_modal_files
     from floatframe.pictures.overview import overview_pages
     from floatframe.results.sensor_choice import chosen_measurements
     from floatframe.results.sensor_plots import sensor_pages
@@ -401,12 +401,14 @@ def plot_command(
     if kind:
         spectra.plot_as(trajectory, sensors, kind, path, resolution=resolution, rotation=rotation)
         return
+    has_bodies = True
     try:
-        bodies = bodies_of(trajectory)
+        require_modal_files(trajectory)
     except CmsError as error:  # the motion can be plotted without its bodies
         typer.echo(f"note: elastic displacement is omitted: {error}", err=True)
-        bodies = {}
+        has_bodies = False
     system = spectra.known_system(trajectory)
+    bodies = bodies_of(trajectory, system) if has_bodies else {}
     if sensors:
         if system is None:
             raise ResultsError(
@@ -446,7 +448,7 @@ def animate_command(
     from fe_models.foundation.words import nearest
     from floatframe.errors import ResultsError
     from floatframe.model.bodies.rigid_body import RigidBody
-    from floatframe.pictures.animation import animate, bodies_of
+    from floatframe.pictures.animation import animate, bodies_of, require_modal_files
     from floatframe.pictures.body_colors import BODY_COLORS
     from floatframe.results.trajectory import read_trajectory
 
@@ -456,8 +458,9 @@ def animate_command(
     path = output_path(
         output, file.with_suffix(".gif"), ResultsError, overwrite_of=(file, *trajectory.files), needs_file=True
     )
-    bodies: dict[str, ReducedBody | RigidBody] = {**bodies_of(trajectory)}
+    require_modal_files(trajectory)
     system = spectra.known_system(trajectory)
+    bodies: dict[str, ReducedBody | RigidBody] = {**bodies_of(trajectory, system)}
     if system is not None:  # boxes with the inertia of rigid bodies, instead of cubes
         bodies |= {body.name: body for body in system.bodies if isinstance(body, RigidBody)}
     with stages(remaining=True) as clock, clock("film") as advance:

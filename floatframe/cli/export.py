@@ -215,7 +215,7 @@ def write_table(file: Path, output: Path | None, ending: str, *, sensors: Sequen
             "--sensor: the system file of the run does not exist any more, or the run was made in Python"
         )
     if system is None or not sensors:
-        bodies = bodies_of(trajectory)
+        bodies = bodies_of(trajectory, system)
         write_outputs([path], table=lambda: motion_table(trajectory, bodies, system))
     else:
         write_outputs([path], table=lambda: sensor_table(trajectory, chosen_measurements(system, trajectory, sensors)))
@@ -238,6 +238,7 @@ def write_signals(file: Path, output: Path | None, *, sensors: Sequence[str] = (
 
 def write_surfaces(file: Path, output: Path | None, *, every: int = 1) -> None:
     """Write the deformed surfaces of a motion, with their stress, for ParaView."""
+    from floatframe.cli.spectra import known_system
     from floatframe.errors import ResultsError
     from floatframe.pictures.animation import bodies_of
     from floatframe.results.export import export_vtk
@@ -247,7 +248,7 @@ def write_surfaces(file: Path, output: Path | None, *, every: int = 1) -> None:
     path = output_file(
         output, file.with_suffix(".pvd"), (".pvd",), ResultsError, overwrite_of=(file, *trajectory.files)
     )
-    bodies = bodies_of(trajectory)
+    bodies = bodies_of(trajectory, known_system(trajectory))
     with stages(remaining=True) as clock, clock("surfaces") as advance:
         written = export_vtk(trajectory, bodies, path, every=every, on_frame=lambda done, all_: advance(done / all_))
     say(f"wrote {path} and {len(written) - 1} surfaces in {path.with_suffix('')}")

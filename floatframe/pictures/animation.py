@@ -12,6 +12,7 @@ from cms.body.reduced_body import ReducedBody, ReducedInterface
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import ResultsError
+from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.bodies.rigid_body import RigidBody
 from floatframe.model.rotations import rotation_matrix
 from floatframe.model.shapes import Piece
@@ -25,7 +26,7 @@ from floatframe.pictures.stage import box_of, film_size, ground_grid, view_axes
 from floatframe.results.recovery import nodal_displacements
 from floatframe.results.trajectory import BodyMotion, Trajectory
 
-__all__ = ["animate", "bodies_of", "motion_scene"]
+__all__ = ["animate", "bodies_of", "motion_scene", "require_modal_files"]
 
 VISIBLE = 0.02  #: displacement, relative to the diagonal of a body, below which displacements are magnified
 DRAWN = 0.06  #: largest magnified displacement, relative to the diagonal of a body
@@ -86,22 +87,45 @@ def animate(
     return render_animation(scene, path, fps=times.fps, on_frame=on_frame)
 
 
-def bodies_of(trajectory: Trajectory) -> dict[str, ReducedBody]:
-    """Return the reduced bodies of a trajectory, by name, read from its modal files.
+def require_modal_files(trajectory: Trajectory) -> None:
+    """Check that the modal files of a motion are those with which it was computed.
 
     Raises
     ------
     ResultsError
-        If a modal file is not the one with which the motion was computed.
+        If a file has changed.
+    CmsError
+        If there is no such file any more.
     """
+    for entry in trajectory.head.bodies:
+        if entry.source and entry.digest and digest(entry.source) != entry.digest:
+            raise ResultsError(
+                f"body {entry.name!r}: {entry.source} has changed since the motion was computed; run it again"
+            )
+
+
+def bodies_of(trajectory: Trajectory, system: System | None = None) -> dict[str, ReducedBody]:
+    """Return the reduced bodies of a trajectory, by name, from its system, or read from its modal files.
+
+    Raises
+    ------
+    ResultsError
+        If a modal file has changed since the motion was computed, or the system file selected modes of a body and the
+        system is not known.
+    """
+    require_modal_files(trajectory)
+    known = {} if system is None else {b.name: b.reduced for b in system.bodies if isinstance(b, FlexibleBody)}
     found = {}
     for entry in trajectory.head.bodies:
-        if entry.source:
-            if entry.digest and digest(entry.source) != entry.digest:
-                raise ResultsError(
-                    f"body {entry.name!r}: {entry.source} has changed since the motion was computed; run it again"
-                )
-            found[entry.name] = read(entry.source, units=trajectory.units)
+        if not entry.source:
+            continue
+        reduced = known.get(entry.name) or read(entry.source, units=trajectory.units)
+        if reduced.n_q != entry.n_q:
+            raise ResultsError(
+                f"body {entry.name!r}: {entry.source} has {reduced.n_q} modes, but its motion has {entry.n_q}; its "
+                "system file selects them: put it back where the run found it"
+            )
+        found[entry.name] = reduced
     return found
 
 

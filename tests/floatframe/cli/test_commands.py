@@ -225,6 +225,21 @@ def test_bodies_in_other_units_are_converted_with_a_note(folder, caplog):
     assert_allclose(part.nodes, synthetic_reduced_body().nodes / 1000, rtol=1e-14)
 
 
+@pytest.mark.parametrize("chosen", ["is_rigid = true", "modes = [0, 1]"])
+def test_a_body_with_selected_modes_is_plotted_filmed_and_exported(folder, chosen):
+    """The modal file has five modes, and the system file says which of them move."""
+    write(synthetic_reduced_body(), folder / "part.h5")
+    (folder / "spin.toml").write_text(FLEXIBLE.replace("omega_B", f"{chosen}\nomega_B"))
+    assert run("run", folder / "spin.toml").exit_code == 0
+    results = folder / "spin.h5"
+    for words in (["plot"], ["animate", "--speed", "0.1"], ["export", "--to", "csv"], ["export", "--to", "vtk"]):
+        result = run(words[0], results, *words[1:])
+        assert (result.exit_code, result.stderr) == (0, ""), words
+    assert {"spin.png", "spin.gif", "spin.csv", "spin.pvd"} < set(contents(folder))
+    (folder / "spin.toml").unlink()
+    assert_refused(run("animate", results), "part.h5 has 5 modes, but its motion has", "put it back")
+
+
 def test_the_output_is_checked_before_the_work(folder):
     for output, words in [
         ("nowhere/out.h5", "does not exist"),
