@@ -9,7 +9,15 @@ import numpy as np
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 from floatframe.errors import ResultsError
-from floatframe.pictures.plots import axes_for, labelled, plot_drift, plot_energies, plot_energy_balance
+from floatframe.pictures.plots import (
+    MOST_CURVES,
+    axes_for,
+    labelled,
+    note_omitted,
+    plot_drift,
+    plot_energies,
+    plot_energy_balance,
+)
 from floatframe.results.recovery import elastic_displacements, interface_positions
 from floatframe.results.sensor_plots import groups_of, pages_of, plot_measurement
 from floatframe.results.sensors.measurement import Measurement
@@ -20,8 +28,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = ["overview_pages", "plot_deformation", "plot_loads", "plot_places"]
-
-MOST_CURVES = 8  #: largest number of curves in a plot; if there are more, those with the largest values are drawn
 
 
 def overview_pages(
@@ -127,5 +133,4 @@ def draw_largest(ax: "Axes", trajectory: Trajectory, curves: Mapping[str, Array]
     for name, values in curves.items():
         if name in kept:
             ax.plot(trajectory.t, values, label=name)
-    if len(kept) < len(curves):
-        ax.text(0.99, 0.02, f"the largest {len(kept)} of {len(curves)}", ha="right", transform=ax.transAxes, alpha=0.6)
+    note_omitted(ax, len(kept), len(curves))

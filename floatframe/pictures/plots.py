@@ -23,6 +23,7 @@ __all__ = [
 ]
 
 SHOWN = 1e-6  #: smallest drift on the axis, relative to the largest drift
+MOST_CURVES = 8  #: largest number of curves in a plot; if there are more, those with the largest values are drawn
 
 
 def plot_energies(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
@@ -89,7 +90,7 @@ def plot_reaction(trajectory: Trajectory, name: str, ax: "Axes | None" = None) -
 def plot_drift(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
     """Plot the constraint error of each joint, as distance and angle, on a logarithmic axis.
 
-    Errors that stay below `SHOWN` times the largest one are rounding errors; the figure states their number.
+    The largest ones are drawn. Errors that stay below `SHOWN` times the largest one are rounding errors.
     """
     ax, length = axes_for(trajectory, ax), trajectory.units.length_symbol
     sizes = {}
@@ -99,19 +100,24 @@ def plot_drift(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
         sizes[f"{name} angle [rad]"] = np.abs(drift.angle)
     peaks = {name: float(np.nanmax(size, initial=0.0)) for name, size in sizes.items()}
     most = max(peaks.values(), default=0.0)
-    kept = [name for name, peak in peaks.items() if peak > SHOWN * most]
+    ranked = sorted(peaks, key=lambda name: -peaks[name])[:MOST_CURVES]
+    kept = [name for name, peak in peaks.items() if name in ranked and peak > SHOWN * most]
     for name in kept:
         ax.semilogy(trajectory.t, np.where(sizes[name] > 0, sizes[name], np.nan), linewidth=0.8, label=name)
     if kept:
         decades = -np.log10(SHOWN)
         ax.set_ylim(SHOWN * most, most * 10 ** (0.14 * decades * (1 + (len(kept) + 1) // 2)))  # room for the legend
-    if len(kept) < len(peaks):
-        less = len(peaks) - len(kept)
-        ax.text(0.99, 0.02, f"{less} below {SHOWN * most:.0e}", ha="right", transform=ax.transAxes, alpha=0.6)
+    note_omitted(ax, len(kept), len(peaks))
     ax.set_ylabel(f"drift of joints [{length}, rad]")
     if kept:
         ax.legend(fontsize="small", ncols=2, loc="upper left")
     return ax
+
+
+def note_omitted(ax: "Axes", n_shown: int, n_all: int) -> None:
+    """Write above a plot that it shows only the largest curves."""
+    if n_shown < n_all:
+        ax.set_title(f"the largest {n_shown} of {n_all}", loc="right", fontsize="small", alpha=0.6)
 
 
 def axes_for(trajectory: Trajectory, ax: "Axes | None") -> "Axes":

@@ -1,5 +1,6 @@
 """Plots show what the trajectory holds."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import matplotlib as mpl
@@ -62,12 +63,26 @@ def test_drift_that_is_rounding_beside_the_largest_is_counted_and_not_drawn(moti
     ax = plots.plot_drift(motion)
     line, _ = ax.get_lines()  # of two joints, the distances alone
     assert_array_equal(np.asarray(line.get_ydata())[1:], 1e-9 * size[1:])
-    assert [text.get_text() for text in ax.texts] == ["2 below 1e-15"]
+    assert ax.get_title(loc="right") == "the largest 2 of 4"
 
 
 def test_reaction_is_drawn_by_component(motion):
     ax = plots.plot_reaction(motion, "link")
     assert_array_equal(ax.get_lines()[0].get_ydata(), motion.reaction("link").force[:, 0])
+
+
+def test_the_drift_of_many_joints_is_not_hidden_under_its_legend(motion, monkeypatch):
+    """Forty errors of like size: eight are drawn, below the legend."""
+    t = np.linspace(0.0, 1.0, len(motion.t))
+    names = tuple(f"joint of a long name {k}" for k in range(20))
+    errors = {name: 1e-9 * (1 + 0.1 * k) * (2 + np.sin(30 * t + k)) for k, name in enumerate(names)}
+    monkeypatch.setattr(
+        Trajectory, "drift", lambda self, name: SimpleNamespace(distance=errors[name], angle=errors[name])
+    )
+    ax = plots.plot_drift(Trajectory(replace(motion.head, joints=names), motion.source, is_complete=True))
+    assert len(ax.lines) == 8
+    assert ax.get_title(loc="right") == "the largest 8 of 40"
+    assert covered(ax.figure) == []
 
 
 def test_no_legend_of_an_overview_covers_a_curve():
