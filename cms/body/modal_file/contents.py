@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from cms.errors import ModalFileError
-from fe_models.foundation.arrays import require_shape
 from fe_models.foundation.hdf5_file import Attribute
 
 __all__ = ["Attribute", "Content", "Contents", "Dataset"]
@@ -38,29 +37,12 @@ class Contents:
     def __init__(self, content: Content) -> None:
         self.content = content
 
-    def array(self, path: str) -> np.ndarray:
-        """Return the numbers of a dataset."""
-        values = self._values(path)
-        if isinstance(values, tuple):
-            raise ModalFileError(f"dataset {path}: expected numbers, got text")
-        return values
-
-    def number(self, path: str) -> float:
-        """Return the single number of a dataset."""
-        values = self.array(path)
-        require_shape(f"dataset {path}", values, ())
-        return float(values)
-
-    def arrays(self, group: str, *names: str) -> dict[str, Any]:
-        """Return the arrays of the named datasets in a group."""
-        return {name: self.array(f"{group}/{name}") for name in names}
-
-    def strings(self, path: str) -> tuple[str, ...]:
-        """Return the strings of a dataset."""
-        values = self._values(path)
-        if not isinstance(values, tuple):
-            raise ModalFileError(f"dataset {path}: expected text, got numbers")
-        return values
+    def value(self, path: str) -> Any:
+        """Return the values of a dataset: an array, one number, or a tuple of strings."""
+        if path not in self.content.datasets:
+            raise ModalFileError(f"dataset {path} is missing; the file was not written by a complete writer")
+        values = self.content.datasets[path].values
+        return values if isinstance(values, tuple) or np.ndim(values) else float(values)
 
     def attribute(self, path: str, name: str, kind: type) -> Any:
         """Return an attribute after checking its type."""
@@ -86,8 +68,3 @@ class Contents:
         """Return whether an optional group exists and, if it has this attribute, is marked as present."""
         there = group in self.content.attributes
         return there and (name is None or bool(self.attribute(group, name, int)))
-
-    def _values(self, path: str) -> Any:
-        if path not in self.content.datasets:
-            raise ModalFileError(f"dataset {path} is missing; the file was not written by a complete writer")
-        return self.content.datasets[path].values

@@ -8,6 +8,7 @@ contents.
 
 import io
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ import numpy as np
 
 from cms.body.modal_file.content import FORMAT, body_of, content_of, require_same_frequencies, require_same_invariants
 from cms.body.modal_file.contents import Attribute, Content, Dataset
-from cms.body.modal_file.entries import in_units
+from cms.body.modal_file.schema import in_units
 from cms.body.reduced_body import ReducedBody
 from cms.errors import CmsError, ModalFileError
 from fe_models.foundation.hdf5_file import (
@@ -134,7 +135,9 @@ def convert_units(reduced: ReducedBody, units: Units | str) -> ReducedBody:
     content = in_units(content_of(reduced, VERSION), reduced.units, new)
     provenance = {"/provenance": dict(reduced.provenance) | record}
     attributes = dict(content.attributes) | provenance
-    return body_of(Content(content.format, content.version, content.datasets, attributes))
+    body = body_of(replace(content, attributes=attributes))
+    tables = {name: table.in_units(new) for name, table in reduced.recovery.items()}
+    return replace(body, recovery=tables) if tables else body
 
 
 def digest(path: str | os.PathLike[str]) -> str:

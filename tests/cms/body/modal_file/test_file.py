@@ -13,10 +13,12 @@ import pytest
 from cms.body.invariants import Moments
 from cms.body.modal_file import content as modal_content
 from cms.body.modal_file import file as modal_file
+from cms.body.modal_file.content import body_of, content_of
 from cms.body.modal_file.contents import Dataset
-from cms.body.modal_file.file import convert_units, digest, read, write
+from cms.body.modal_file.file import VERSION, convert_units, digest, read, write
+from cms.body.modal_file.schema import ENTRIES, GROUPS, dataset_of
 from cms.body.reduced_body import ReducedBody
-from cms.errors import ModalFileError, UnitsError
+from cms.errors import BodyError, ModalFileError, UnitsError
 from cms.modes.mode_sets import craig_bampton
 from cms.reduction.basis.damping import RampDamping
 from cms.reduction.basis.frames import NodalFrame
@@ -26,7 +28,7 @@ from fe_models.body.fe_body import Interface
 from fe_models.body.loads import gravity_load, interface_load
 from fe_models.body.material import Material
 from fe_models.elements.solids.body import solid_body
-from fe_models.foundation.units import UNIT_SYSTEMS, unit_system
+from fe_models.foundation.units import UNIT_SYSTEMS, Units, unit_system
 from tests.bodies import box_mesh, distorted
 from tests.cms.body.modal_file.examples import differences
 from tests.root import ROOT
@@ -441,6 +443,37 @@ def test_every_attribute_is_in_the_specification(path):
         for group in ("/", *groups, "stress"):
             for name in file[group].attrs:
                 assert f"`{name}`" in table, f"{group}: {name}"
+
+
+def test_the_tables_of_the_specification_are_those_of_the_layout():
+    named = Units("", 1.0, 1.0, 1.0, "length", "mass", "time", "", "")
+    page = DOCUMENT.read_text(encoding="utf-8")
+    found = re.findall(r"^\| `(/[^`]+)` \| (\([^|]*) \| ([^|]*) \| [^|]", page, re.MULTILINE)
+    written = {path: (shape, re.sub(", then (.*)", r" (rows 0-2), \1 (rows 3-5)", unit)) for path, shape, unit in found}
+    assert written == {path: (each.shape, dataset_of(path, (), named).unit) for path, each in ENTRIES.items()}
+    kinds = {"text": str, "integer": int, "float": float}
+    rows = re.findall(r"^\| `(/[^`]*)` \| (`[^|]*`) \| (\w+) \|", page, re.MULTILINE)
+    attributes = {(path, name): kinds[kind] for path, names, kind in rows for name in re.findall("`([^`]+)`", names)}
+    for path, group in GROUPS.items():
+        for name, kind in group.attributes.items():
+            assert attributes[path, name] is (int if kind is bool else kind), (path, name)
+
+
+@pytest.mark.parametrize(
+    ("path", "values", "words"),
+    [
+        ("/modes/K", np.eye(2), r"dataset /modes/K: expected shape \(5, 5\), got \(2, 2\)"),
+        ("/interfaces/0/Psi", np.zeros((3, 5)), r"dataset /interfaces/0/Psi: expected shape \(6, 5\), got \(3, 5\)"),
+        ("/columns/A", np.zeros((1, 5)), r"dataset /columns/A: expected shape \(3, 5\), got \(1, 5\)"),
+        ("/modes/labels", np.zeros(5), "dataset /modes/labels: expected text, got numbers"),
+        ("/modes/M", ("text",), "dataset /modes/M: expected numbers, got text"),
+    ],
+)
+def test_a_dataset_of_another_shape_or_kind_is_named(body, path, values, words):
+    content = content_of(body, VERSION)
+    datasets = {**content.datasets, path: replace(content.datasets[path], values=values)}
+    with pytest.raises((BodyError, ModalFileError), match=words):
+        body_of(replace(content, datasets=datasets))
 
 
 def test_units_follow_from_the_unit_system(path):
