@@ -36,6 +36,10 @@ n_processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") 
 SPREAD = ("-n", str(min(n_processors, MOST_WORKERS)), "--dist", "loadfile")
 
 LINT = ("lint", "ruff", "check", ".")
+SPELLING = (
+    "spelling", "codespell_lib", ".github", "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs", "notebooks",
+    "benchmarks", "cms", "fe_models", "floatframe",
+)  # fmt: skip
 TYPES = ("types", "mypy")
 #: else each worker compiles them
 KERNELS = ("kernels", "floatframe.cli.compile_kernels", "relative", "schemes", "recursion", "cholesky")
@@ -75,7 +79,7 @@ class Group:
 
 
 GROUPS = {
-    "ci": Group(((LINT,), (TYPES, KERNELS), (TESTS, PLAIN, DOCUMENTATION, RELATIVE_IN_SHORT)), 20),
+    "ci": Group(((LINT, SPELLING), (TYPES, KERNELS), (TESTS, PLAIN, DOCUMENTATION, RELATIVE_IN_SHORT)), 20),
     "long": Group(((LONG,), (PLAIN_MOTIONS,), (RELATIVE,)), 90),
     "relative": Group(((KERNELS,), (RELATIVE,)), 15),
     "external": Group(((EXTERNAL,),), 10),

@@ -222,7 +222,7 @@ def _read(path: str | Path, convert: Callable[[RawMesh, Path, str], M]) -> M:
     suffix = path.suffix.lower()
     if suffix in CAD_FORMATS:
         raise MeshError(
-            f"{where}: this is a CAD geometry, which has to be meshed: a table [mesh_size] in a job, or "
+            f"{where}: this is a CAD geometry, which must be meshed: a table [mesh_size] in a job, or "
             f"fe_models.files.mesh_cad(path, fe_models.files.MeshSize(size), units=...)"
         )
     if suffix not in MESH_FORMATS and path.exists() and not path.is_dir():

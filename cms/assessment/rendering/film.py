@@ -54,7 +54,7 @@ def write_picture(image: Image, path: Path) -> None:
 def write_film(frames: Iterable[Image], path: Path, *, fps: float) -> None:
     """Write frames, each (height, width, 3) uint8, as a film in the format of the suffix.
 
-    A GIF repeats for ever. Its frames last whole hundredths of a second, so its frame rate is the nearest possible one.
+    A GIF repeats forever. Its frames last whole hundredths of a second, so its frame rate is the nearest possible one.
     """
     if path.suffix.lower() == ".gif":
         write_gif(frames, path, fps)

@@ -88,7 +88,7 @@ def run_compare(request: CompareRequest) -> None:
 
 
 def require_job(path: Path) -> None:
-    """Raise `CompareError` for a modal file or the file of a model; the message says what is needed."""
+    """Raise `CompareError` for a modal file or the file of a model; the message names the file to give."""
     if path.suffix.lower() == ".toml":
         return
     from cms.cli.exchange import FORMATS

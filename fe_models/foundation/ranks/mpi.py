@@ -70,7 +70,7 @@ class MpiRanks:
         os._exit(FAILED)
 
     def _call(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> list[Any]:
-        """Call the function here. If only some ranks raise an error, the others would wait for ever: end all ranks."""
+        """Call the function here. If only some ranks raise an error, the others would wait forever: end all ranks."""
         answer: Any = None
         error: ReportedError | None = None
         try:

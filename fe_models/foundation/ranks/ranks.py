@@ -33,7 +33,7 @@ class Ranks(Protocol):
         """Call function(ranks, *arguments) on all ranks at once, from rank 0; return their results in order.
 
         The function must be defined at the top level of a module. An error that all ranks or only rank 0 raise is
-        raised here. Any other error ends all ranks, because the remaining ranks would wait for ever.
+        raised here. Any other error ends all ranks, because the remaining ranks would wait forever.
         """
 
     def serve(self) -> None:

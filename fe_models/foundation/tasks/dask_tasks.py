@@ -116,7 +116,7 @@ def dask_at(host: str, port: int) -> "DaskTasks":
 def listen(host: str, port: int) -> None:
     """Raise `OSError` unless a scheduler listens at the address; it sends the length of a message in 8 bytes first.
 
-    Without this check, Dask's client would wait for ever if a program accepts the connection and sends nothing.
+    Without this check, Dask's client would wait forever if a program accepts the connection and sends nothing.
     """
     with socket.create_connection((host, port), timeout=CONNECT) as connection:
         heard = b""

@@ -216,7 +216,7 @@ class Kept:
     def go_on_from(self, memory: object, f: Array, *, is_anew: bool) -> None:
         """Prepare the arrays for steps from a memory with multipliers f, reusing those of the last steps if they fit.
 
-        is_anew: whether to discard what is known from earlier steps, as a run resumed from a file does.
+        is_anew: whether to discard the memory of earlier steps, as a run resumed from a file does.
         """
         arrays = [getattr(self.step, name) for name in REMEMBERED]
         if memory is self.before and not is_anew:

@@ -113,7 +113,7 @@ def test_unknown_suffix_names_the_choices(tmp_path):
 
 
 def test_cad_files_are_refused_with_the_way_to_mesh_them(tmp_path):
-    assert "this is a CAD geometry, which has to be meshed" in refusal(tmp_path, "rod.stp", "ISO-10303-21;")
+    assert "this is a CAD geometry, which must be meshed" in refusal(tmp_path, "rod.stp", "ISO-10303-21;")
 
 
 def test_unreadable_file_is_refused(tmp_path, monkeypatch):
