@@ -1,4 +1,4 @@
-"""Pages, notebooks and docstrings avoid constructions that readers had to read twice; correct spelling is a lint check."""
+"""Pages, notebooks and docstrings avoid constructions that readers had to read twice; codespell checks spelling."""
 
 import json
 import re
