@@ -174,7 +174,8 @@ def with_expressions(schema: Mapping[str, Any]) -> dict[str, Any]:
     if "anyOf" in found:
         found["anyOf"] = [with_expressions(value) for value in found["anyOf"]]
     if "additionalProperties" in found:
-        found["additionalProperties"] = either(found["additionalProperties"], REMOVED_SCHEMA)
+        # a table of another type than that of the base file removes keys that its own type does not have
+        found["additionalProperties"] = either(found["additionalProperties"], REMOVED_SCHEMA) or REMOVED_SCHEMA
     if "properties" in found:
         found["properties"] = {
             name: value if name == "kind" else either(value, REMOVED_SCHEMA)

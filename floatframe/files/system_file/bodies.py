@@ -126,7 +126,7 @@ def body_of(name: str, section: BodySection, files: dict[Any, ReducedBody], unit
         "orientation": orientation,
         "velocity": section.velocity,
         "omega_B": section.omega_B,
-        "shapes": [each.shape for each in section.shapes],
+        "shapes": [each.object_named() for each in section.shapes],
     }
     if section.file is None:
         assert section.mass is not None  # ensured by the validation of the table

@@ -46,7 +46,16 @@ from floatframe.model.bodies.coordinates import JointCoordinateName
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.functions.time_functions import TimeFunction
 
-__all__ = ["DescribedSection", "OneOf", "Signals", "fields_table_of", "key_of", "python_value"]
+__all__ = [
+    "DescribedSection",
+    "OneOf",
+    "Signals",
+    "fields_table_of",
+    "key_of",
+    "keys_of_fields",
+    "python_value",
+    "type_key",
+]
 
 log = logging.getLogger(__name__)
 
@@ -58,15 +67,16 @@ class FieldsTable(Table):
 
     model_config = ConfigDict(protected_namespaces=())
     described: ClassVar[Any]  #: the class
+    is_typed: ClassVar[bool] = False  #: whether its key `type` names the class
 
     def object_with(self, signals: Signals, **given: Any) -> Any:
         """Return the object of the table; fields that are no keys are passed as `given`."""
-        values = {
-            key: python_value(getattr(self, key), signals)
-            for key in type(self).model_fields
-            if key in self.model_fields_set
-        }
-        return self.described(**given, **values)
+        return self.described(**given, **self.python_values(signals))
+
+    def python_values(self, signals: Signals) -> dict[str, Any]:
+        """Return the values of the given keys but `type`, as the class takes them."""
+        given = {key: value for key, value in self if key in self.model_fields_set}
+        return {key: python_value(value, signals) for key, value in given.items() if key != "type" or not self.is_typed}
 
 
 class MarkerSection(Table):
@@ -81,6 +91,7 @@ class DescribedSection(FieldsTable):
     """A table that describes an object; a marker has keys for its body, its place and its axes."""
 
     is_measured: ClassVar[bool]  #: whether its places may be nodes, elements and sets of a mesh
+    is_typed = True
     type: Any
 
     def object_named(self, name: str, signals: Signals = None) -> Any:
@@ -100,16 +111,21 @@ class DescribedSection(FieldsTable):
                 given[each.name] = python_value(getattr(self, each.name), signals)
         return self.described(name=name, **given)
 
+    def require_accepted(self) -> None:
+        """Raise the error of the class if it does not accept the values."""
+        self.object_named("")
+
     @pydantic.model_validator(mode="wrap")
     @classmethod
     def _accepted_by_the_class(cls, table: Any, handler: Any) -> Any:
         section = handler(table)
         try:
-            section.object_named("")
+            section.require_accepted()
         except SignalError:  # signals are known once the whole file is read
             return section
         except ModelError as error:
-            text = re.sub(r"^\w+ '': ", "", str(error))
+            # of a message such as "joint '': axis: expected ..." or "wheel: radius: expected ..."
+            text = re.sub(rf"^(\w+ ''|shape|{re.escape(str(table.get('type')))}): ", "", str(error))
             key, _, reason = text.partition(": ")
             if key not in cls.model_fields or key not in table:
                 raise ValueError(text) from None
@@ -204,11 +220,24 @@ def fields_of_value(name: str, hint: Any, meaning: str, *, is_needed: bool) -> d
     return {name: (key.type | None, pydantic.Field(None, description=text))}
 
 
+@cache
 def meanings_of(kind: Any) -> dict[str, str]:
-    """Return the descriptions of the fields in the docstring of a class."""
+    """Return the descriptions of the fields of a class: from its docstring, and from comments that begin with `#:`."""
     _, _, listed = (inspect.getdoc(kind) or "").partition("Parameters\n----------\n")
     found = re.findall(r"^(\w.*)\n((?: +.*\n?)+)", listed.partition("\n\n")[0] + "\n", re.MULTILINE)
-    return {name: " ".join(text.split()).removesuffix(".") for names, text in found for name in names.split(", ")}
+    named = {name: text for names, text in found for name in names.split(", ")}
+    commented = r"((?:^    #: .*\n)*)^    (\w+): [^#\n]*(?:#: (.*))?$"
+    for before, name, after in re.findall(commented, source_of(kind), re.MULTILINE):
+        named.setdefault(name, before.replace("#:", "") + after)
+    return {name: " ".join(text.split()).removesuffix(".") for name, text in named.items()}
+
+
+def source_of(kind: Any) -> str:
+    """Return the source of a class, "" if there is none."""
+    try:
+        return inspect.getsource(kind)
+    except (OSError, TypeError):
+        return ""
 
 
 @cache
@@ -228,7 +257,7 @@ def section_of(name: str, kind: Any, place: str, stated: tuple[type, ...], is_me
     is_measured
         Whether places may be nodes, elements and sets of a mesh.
     """
-    keys: dict[str, Any] = {"type": (Literal[name], pydantic.Field(description=f'"{name}"'))}
+    keys: dict[str, Any] = {"type": type_key(name)}
     hints, meanings = hints_of(kind), meanings_of(kind)
     for each in own_fields(kind):
         hint, meaning = hints[each.name], meanings.get(each.name, "")
@@ -246,19 +275,28 @@ def section_of(name: str, kind: Any, place: str, stated: tuple[type, ...], is_me
     return model
 
 
-@cache
-def fields_table_of(kind: Any, left_out: tuple[str, ...] = ()) -> type[FieldsTable]:
-    """Return the model of the tables whose keys are the fields of a dataclass, without those that are left out."""
+def type_key(name: str) -> Any:
+    """Return the key `type` of the tables of a type."""
+    return Literal[name], pydantic.Field(description=f'"{name}"')
+
+
+def keys_of_fields(kind: Any, left_out: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Return the keys of the fields of a dataclass, without those that are left out; a marker is a table."""
     meanings = meanings_of(kind)
     keys: dict[str, Any] = {}
     for each in fields(kind):
         if each.init and each.name not in left_out:
+            hint, meaning = hints_of(kind)[each.name], meanings.get(each.name, "")
             is_needed = each.default is MISSING and each.default_factory is MISSING
-            keys |= fields_of_value(
-                each.name, hints_of(kind)[each.name], meanings.get(each.name, ""), is_needed=is_needed
-            )
+            keys |= fields_of_value(each.name, hint, meaning, is_needed=is_needed)
+    return keys
+
+
+@cache
+def fields_table_of(kind: Any, left_out: tuple[str, ...] = ()) -> type[FieldsTable]:
+    """Return the model of the tables whose keys are the fields of a dataclass, without those that are left out."""
     summary = (inspect.getdoc(kind) or "").partition("\n\n")[0]
-    model = create_model(kind.__name__, __base__=FieldsTable, __doc__=summary, **keys)
+    model = create_model(kind.__name__, __base__=FieldsTable, __doc__=summary, **keys_of_fields(kind, left_out))
     model.described = kind
     return model
 
@@ -392,10 +430,14 @@ class OneOf:
         """Return the model of a table; if its type is missing or unknown, a model that says so."""
         kind = value.get("type") if isinstance(value, dict) else None
         if isinstance(kind, str) and kind in self.kinds:
-            return section_of(kind, self.kinds[kind], self.place, self.stated, self.is_measured)
+            return self.section(kind)
         typed = choice(f"type of {self.what}", lambda: tuple(self.kinds), self.elsewhere)
         field = pydantic.Field(description=f"one of {', '.join(self.kinds)}")
         return create_model(self.what, __base__=AnyTable, type=(typed, field))
+
+    def section(self, kind: str) -> type[DescribedSection]:
+        """Return the model of the tables of a type."""
+        return section_of(kind, self.kinds[kind], self.place, self.stated, self.is_measured)
 
     def validated(self, value: Any, info: ValidationInfo) -> Table:
         """Return the validated table."""

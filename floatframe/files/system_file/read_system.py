@@ -220,7 +220,7 @@ def read_system(
             controllers=[section.controller(key, path.parent) for key, section in data.controllers.items()],
             events=[section.event(key) for key, section in data.events.items()],
             fmus=[section.unit(key, path.parent) for key, section in data.fmus.items()],
-            scene=[section.shape for section in data.scene],
+            scene=[section.object_named() for section in data.scene],
             source=str(path.resolve()),
             changes=dict(changes or {}),
             data_files=tuple(dict.fromkeys(map(str, data_files))),

@@ -24,7 +24,7 @@ class Wheel:
     radius: float  #: radius of the tread [m]
     width: float  #: width of the tyre [m]
     rim_radius: float | None = None  #: radius of the rim [m]; None: 0.64 of the radius
-    n_spokes: int = 5
+    n_spokes: int = 5  #: number of spokes, 0 to 60
     axis: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  #: axis of rotation, (3,)
 
     def __post_init__(self) -> None:
