@@ -143,7 +143,7 @@ SCHEMA_LINE = re.compile(rb"#:schema (?:\.\./)*([a-z]+)\.schema\.json\r?\n")
 def schema_text(kind: str) -> str:
     """Return the JSON schema of a kind of file, one of `KINDS`."""
     schema = json_schema(KINDS[kind].table_class(), is_parametric=KINDS[kind].is_parametric)
-    return json.dumps(schema, indent=2) + "\n"
+    return json.dumps(schema, indent=1) + "\n"
 
 
 def schemas_named_in(contents: Iterable[bytes]) -> dict[str, bytes]:

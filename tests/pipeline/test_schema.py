@@ -72,6 +72,23 @@ def test_a_schema_refuses_what_the_reader_refuses(schemas):
         assert not validator.is_valid({**content, table: {**content[table], key: value}})
 
 
+@pytest.mark.parametrize(
+    ("room", "table", "wrong"),
+    [
+        ("joints", {"type": "revolute", "body_a": "ground", "body_b": "rod", "axis": [0, 0, 1]}, {"lead": 1.0}),
+        ("forces", {"type": "joint-force", "joint": "pin", "coordinate": "angle", "motor": 2}, {"motor": "2"}),
+        ("sensors", {"type": "velocity", "body": "rod", "node": 3}, {"interface": "end"}),
+        ("elements", {"type": "drives.pid", "marker_a": {"body": "rod"}, "controlled": "angle"}, {"contrlled": "x"}),
+        ("elements", {"type": "mine.mount", "stiffness": 3.0}, {"type": 3}),
+    ],
+)
+def test_a_schema_knows_the_keys_of_each_type(schemas, room, table, wrong):
+    content = {"system": {"units": "m-kg-s"}, "bodies": {"rod": {"mass": 1.0}}}
+    validator = jsonschema.Draft202012Validator(schemas["system"])
+    assert validator.is_valid({**content, room: {"it": table}})
+    assert not validator.is_valid({**content, room: {"it": table | wrong}})
+
+
 def test_a_schema_knows_parameters_and_repeat(schemas):
     content = {
         "extends": "base.toml", "parameters": {"n": 3}, "system": {"units": "m-kg-s"},

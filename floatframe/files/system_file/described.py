@@ -12,7 +12,7 @@ from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
 from functools import cache
 from pathlib import Path
 from types import GenericAlias, NoneType, UnionType
-from typing import Annotated, Any, ClassVar, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 import pydantic
@@ -48,13 +48,15 @@ from floatframe.model.functions.time_functions import TimeFunction
 
 __all__ = [
     "DescribedSection",
+    "FieldsTable",
     "OneOf",
     "Signals",
+    "definition",
     "fields_table_of",
     "key_of",
     "keys_of_fields",
+    "model_of_keys",
     "python_value",
-    "type_key",
 ]
 
 log = logging.getLogger(__name__)
@@ -257,7 +259,7 @@ def section_of(name: str, kind: Any, place: str, stated: tuple[type, ...], is_me
     is_measured
         Whether places may be nodes, elements and sets of a mesh.
     """
-    keys: dict[str, Any] = {"type": type_key(name)}
+    keys: dict[str, Any] = {}
     hints, meanings = hints_of(kind), meanings_of(kind)
     for each in own_fields(kind):
         hint, meaning = hints[each.name], meanings.get(each.name, "")
@@ -268,16 +270,22 @@ def section_of(name: str, kind: Any, place: str, stated: tuple[type, ...], is_me
             keys |= fields_of_value(
                 each.name, hint, meaning, is_needed=default is MISSING or isinstance(default, stated)
             )
-    summary = (inspect.getdoc(kind) or "").partition("\n\n")[0]
-    told = f'[{place}] of type "{name}": {summary}'
-    model = create_model(kind.__name__, __base__=DescribedSection, __doc__=told, __cls_kwargs__={"title": name}, **keys)
-    model.described, model.is_measured = kind, is_measured
+    model = model_of_keys(kind, f"[{place}]", name, DescribedSection, keys)
+    model.is_measured = is_measured
     return model
 
 
-def type_key(name: str) -> Any:
-    """Return the key `type` of the tables of a type."""
-    return Literal[name], pydantic.Field(description=f'"{name}"')
+Model = TypeVar("Model", bound=FieldsTable)
+
+
+def model_of_keys(kind: Any, place: str, name: str, base: type[Model], keys: Mapping[str, Any]) -> type[Model]:
+    """Return the model of the tables at a place that describe an object of a class and have these keys and `type`."""
+    typed: dict[str, Any] = {"type": (Literal[name], pydantic.Field(description=f'"{name}"')), **keys}
+    summary = (inspect.getdoc(kind) or "").partition("\n\n")[0]
+    text = f'{place} of type "{name}": {summary}'
+    model = create_model(kind.__name__, __base__=base, __doc__=text, __cls_kwargs__={"title": name}, **typed)
+    model.described = kind
+    return model
 
 
 def keys_of_fields(kind: Any, left_out: tuple[str, ...] = ()) -> dict[str, Any]:
@@ -452,13 +460,18 @@ class OneOf:
         schemas = []
         for kind in self.kinds:
             try:
-                model = self.model_of({"type": kind})
+                schemas.append(definition(f"{self.what}.{kind}", self.section(kind), handler))
             except ModelError as error:  # of another package, which cannot be loaded
                 log.warning("%s", error)
-                continue
-            ref, schema = f"{self.what}.{model.__name__}:{kind}", model.__pydantic_core_schema__
-            if schema["type"] != "definitions":
-                named: Any = {**schema, "ref": ref}
-                schema = core_schema.definitions_schema(core_schema.definition_reference_schema(ref), [named])
-            schemas.append(handler(schema))
         return {"anyOf": schemas}
+
+
+def definition(name: str, model: type[Table], handler: Any) -> dict[str, Any]:
+    """Return a reference to the JSON schema of a model, which becomes a definition of its own."""
+    schema = model.__pydantic_core_schema__
+    if schema["type"] != "definitions":
+        ref = f"{name.replace('.', '-')}.{model.__name__}:{name}"
+        named: Any = {**schema, "ref": ref}
+        schema = core_schema.definitions_schema(core_schema.definition_reference_schema(ref), [named])
+    found: dict[str, Any] = handler(schema)
+    return found

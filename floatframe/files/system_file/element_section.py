@@ -3,19 +3,28 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import Field, ValidationError, create_model
 
 from fe_models.foundation.toml_file import Table, describe, files_named
 from floatframe.errors import ModelError
-from floatframe.files.system_file.described import Signals, fields_table_of, key_of, python_value
+from floatframe.files.system_file.described import (
+    FieldsTable,
+    Signals,
+    definition,
+    fields_table_of,
+    key_of,
+    keys_of_fields,
+    model_of_keys,
+    python_value,
+)
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.elements.element import Element
-from floatframe.model.elements.registry import element_class
+from floatframe.model.elements.registry import element_class, known_elements
 from floatframe.model.functions.time_functions import TimeFunction
 
-__all__ = ["TableReader", "element_of"]
+__all__ = ["ElementSection", "TableReader", "element_of"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +79,23 @@ class TableReader:
             raise ModelError("; ".join(f"{self.where}.{problem}" for problem in problems)) from None
         self.files.extend(map(str, files_named(section)))
         return section
+
+
+class AnyElement:
+    """Annotation of the table of an element; its JSON schema lists the keys of the elements that do not read it."""
+
+    def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> dict[str, Any]:
+        """Return the schema of a table of any type."""
+        known = {
+            name: model_of_keys(kind, "[elements.NAME]", name, FieldsTable, keys_of_fields(kind, ("name",)))
+            for name, kind in known_elements().items()
+            if is_dataclass(kind) and not hasattr(kind, "from_table")
+        }
+        other = {"type": "object", "properties": {"type": {"type": "string", "not": {"enum": list(known)}}}}
+        return {"anyOf": [*(definition(f"element.{name}", model, handler) for name, model in known.items()), other]}
+
+
+ElementSection = Annotated[dict[str, Any], AnyElement()]
 
 
 def element_of(

@@ -46,7 +46,7 @@ from floatframe.files.system_file.connections import (
     joint_of,
 )
 from floatframe.files.system_file.controller_section import ControllerSection
-from floatframe.files.system_file.element_section import element_of
+from floatframe.files.system_file.element_section import ElementSection, element_of
 from floatframe.files.system_file.keys import Name
 from floatframe.files.system_file.motion_section import overshoot_notes
 from floatframe.files.system_file.run_section import RunOptions, RunSection
@@ -136,7 +136,7 @@ class SystemFile(Table):
     joints: dict[str, JointSection] = Field({}, description="tables [joints.NAME]")
     couplers: dict[str, CouplerSection] = Field({}, description="tables [couplers.NAME]")
     forces: dict[str, ForceSection] = Field({}, description="tables [forces.NAME]")
-    elements: dict[str, dict[str, Any]] = Field({}, description="tables [elements.NAME]")
+    elements: dict[str, ElementSection] = Field({}, description="tables [elements.NAME]")
     signals: dict[str, SignalSection] = Field({}, description="tables [signals.NAME]")
     sensors: dict[str, SensorSection] = Field({}, description="tables [sensors.NAME]")
     inputs: dict[str, InputSection] = Field({}, description="tables [inputs.NAME]")

@@ -4,10 +4,10 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, create_model
+from pydantic import BeforeValidator, Field
 
 from fe_models.foundation.toml_file import existing_file
-from floatframe.files.system_file.described import DescribedSection, OneOf, Signals, keys_of_fields, type_key
+from floatframe.files.system_file.described import DescribedSection, OneOf, Signals, keys_of_fields, model_of_keys
 from floatframe.model.shapes import GEOMETRIES, Shape
 from floatframe.model.shapes.mesh import mesh_file
 
@@ -54,13 +54,7 @@ class OneShape(OneOf):
 def drawn_section_of(kind: str) -> type[DrawnSection]:
     """Return the model of the tables of a geometry."""
     own = OF_FILE if kind == "mesh" else keys_of_fields(GEOMETRIES[kind])
-    keys: dict[str, Any] = {"type": type_key(kind), **own, **PLACE}
-    text = f'[[bodies.NAME.shapes]] or [[scene]] of type "{kind}": {GEOMETRIES[kind].__doc__}'
-    model = create_model(
-        GEOMETRIES[kind].__name__, __base__=DrawnSection, __doc__=text, __cls_kwargs__={"title": kind}, **keys
-    )
-    model.described = GEOMETRIES[kind]
-    return model
+    return model_of_keys(GEOMETRIES[kind], "[[bodies.NAME.shapes]] or [[scene]]", kind, DrawnSection, {**own, **PLACE})
 
 
 ShapeSection = Annotated[DrawnSection, OneShape("shape", GEOMETRIES, "scene")]

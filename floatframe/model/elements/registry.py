@@ -7,12 +7,14 @@ A package of elements, of the project or of a user, defines in its `__init__`
 The package is imported when one of its names is used, and the module of an element when the element is used.
 """
 
+import logging
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from pkgutil import iter_modules
 from types import ModuleType
 from typing import TypeGuard
 
@@ -21,7 +23,9 @@ from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.model.elements.element import Element
 
-__all__ = ["element_class"]
+__all__ = ["element_class", "known_elements"]
+
+log = logging.getLogger(__name__)
 
 #: packages of floatframe in which elements are searched first
 OWN = ("floatframe.components", "floatframe.model")
@@ -69,6 +73,23 @@ def element_class(name: str, folder: Path | None = None) -> type[Element]:
                 f"{nearest(element, list(known))}"
             )
         return class_at(name, str(known[element]), module.__name__)
+
+
+def known_elements() -> dict[str, type[Element]]:
+    """Return the element classes of floatframe and of installed packages by name; those that fail are left out."""
+    names = [
+        f"{package.name}.{element}"
+        for wing in OWN
+        for package in iter_modules(import_module(wing).__path__)
+        for element in getattr(import_module(f"{wing}.{package.name}"), "ELEMENTS", {})
+    ]
+    found = {}
+    for name in (*names, *ELEMENT_TYPES):
+        try:
+            found[name] = element_class(name)
+        except ModelError as error:
+            log.warning("%s", error)
+    return found
 
 
 EXPECTED = 'expected ELEMENTS = {"name": "module:Class"} in its __init__.py'
