@@ -2,6 +2,7 @@
 
 import html
 import importlib
+import json
 import logging
 import re
 import sys
@@ -12,6 +13,7 @@ import pytest
 
 from fe_models.door import namespaces
 from fe_models.foundation.file_kinds import KINDS
+from fe_models.foundation.parametric_file import schema_text
 from tests.root import ROOT
 
 
@@ -70,6 +72,18 @@ def test_reference_pages_hold_every_command_option_and_key(tmp_path):
     assert "```sh\ncms reduce rod.toml -o rod.h5\n" in reduce
     beams = pages["job-file"].split("## \\[sections.NAME\\]\n")[1].split("##")[0]
     assert re.search(r"^\| `shear` \| true or false: .* \| `true` \|$", beams, re.MULTILINE)
+
+
+def test_every_key_of_every_kind_of_file_has_a_meaning_on_its_page():
+    missing = []
+    for kind in KINDS:
+        page, schema = reference_pages.keys_page(kind), json.loads(schema_text(kind))
+        for name, table in {"the file": schema, **schema.get("$defs", {})}.items():
+            keys = table.get("properties", {})
+            missing += [
+                f"{kind}, {name}: {key}" for key in keys if not re.search(rf"^\| `{key}` \| \S", page, re.MULTILINE)
+            ]
+    assert missing == []
 
 
 def test_a_formula_is_a_picture_with_its_text_and_stands_on_the_line():

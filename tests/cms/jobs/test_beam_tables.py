@@ -7,12 +7,8 @@ from cms.errors import BodyError, JobError, ModeSetError
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
 from cms.pipeline import reduce_job
-from fe_models.assembly.tables.attachments import LinkSection, MassSection, SpringSection, TieSection
-from fe_models.assembly.tables.beams import SHAPE_KEYS, BeamSection
+from fe_models.assembly.tables.beams import SHAPE_KEYS
 from fe_models.elements.beams.sections import SECTIONS
-from tests.root import ROOT
-
-DOCUMENT = ROOT / "docs" / "job_file.md"
 
 ROD = """
 [body]
@@ -299,13 +295,6 @@ def test_beams_need_sections_and_attachments_need_beams(job_file, tmp_path):
 
 def test_shapes_of_the_job_are_those_of_the_library():
     assert set(SHAPE_KEYS) == set(SECTIONS)
-
-
-def test_every_key_of_beams_is_documented():
-    text = DOCUMENT.read_text(encoding="utf-8")
-    for table in (BeamSection, MassSection, SpringSection, LinkSection, TieSection):
-        for key in table.model_fields:
-            assert f"`{key}`" in text, f"{table.__name__}: {key}"
 
 
 def test_a_short_part_is_reduced_with_the_modes_it_can_have_and_says_so(tmp_path, caplog):

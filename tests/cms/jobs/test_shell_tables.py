@@ -10,12 +10,9 @@ from cms.jobs.body_of_job import job_body, shell_mesh
 from cms.jobs.job import read_job
 from cms.pipeline import reduce_job
 from fe_models.assembly.tables.materials import material_of
-from fe_models.assembly.tables.shells import ShellSection, shell_properties
+from fe_models.assembly.tables.shells import shell_properties
 from fe_models.elements.shells.shell_property import LaminateProperty, Layer
 from fe_models.errors import FeModelsError, MaterialError
-from tests.root import ROOT
-
-DOCUMENT = ROOT / "docs" / "job_file.md"
 
 TRAY = """
 [body]
@@ -265,12 +262,6 @@ def test_a_surface_mesh_without_thickness_is_refused(job_file):
     solid = TRAY[: TRAY.index("[materials.tin]")] + "[reduction]\nn_modes = 1\n"
     with pytest.raises(FeModelsError, match=r"expected solid cells .* a shell needs its thickness \(tables \[shells"):
         job_body(read_job(job_file(solid)))
-
-
-def test_every_key_of_shells_is_documented():
-    text = DOCUMENT.read_text(encoding="utf-8")
-    for key in ShellSection.model_fields:
-        assert f"`{key}`" in text, key
 
 
 def test_a_shell_in_parts_has_all_its_mass_and_load(job_file):
