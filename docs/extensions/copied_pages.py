@@ -1,6 +1,5 @@
-"""Pages whose sources are outside this folder: notebooks with their stored pictures, and files in the top folder."""
+"""Pages whose sources are outside this folder: notebooks as they are stored, and files in the top folder."""
 
-import base64
 import json
 import re
 from pathlib import Path
@@ -23,21 +22,11 @@ def copy_pages(app: Sphinx) -> None:
             old.unlink()
     for name, path in sources.items():
         notebook = json.loads(path.read_text(encoding="utf-8"))
-        for k, cell in enumerate(notebook["cells"]):
-            pictures = sorted((Path(app.srcdir) / "gallery" / "notebooks").glob(f"{path.stem}_{k}_*.png"))
-            if cell["cell_type"] == "code":
-                cell["outputs"] = [shown(picture) for picture in pictures]
         put(json.dumps(notebook | {"metadata": notebook["metadata"] | PYTHON}), folder / name)
     project = Path(app.srcdir) / "project"
     project.mkdir(exist_ok=True)
     for name, copied in TOP.items():
         put((ROOT / name).read_text(encoding="utf-8"), project / copied)
-
-
-def shown(picture: Path) -> dict[str, Any]:
-    """Return a stored picture as the output of a cell."""
-    data = {"image/png": base64.b64encode(picture.read_bytes()).decode("ascii")}
-    return {"output_type": "display_data", "data": data, "metadata": {}}
 
 
 def put(text: str, target: Path) -> None:

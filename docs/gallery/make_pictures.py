@@ -1,12 +1,13 @@
 """Make the pictures of the gallery and of README.md: `python docs/gallery/make_pictures.py [NAME ...]`.
 
 Names are those of MECHANISMS and of the notebooks; without one all are made. The demo's mechanism becomes a film of one
-turn (gif), the others a still each; of a notebook every picture is kept, as NAME_CELL_NUMBER.png. Pictures are shipped,
+turn (gif), the others a still each; a notebook keeps what its cells show. Pictures are shipped,
 small, because making them takes minutes; the documentation shows them as they are.
 """
 
 import base64
 import io
+import re
 import sys
 import tempfile
 from collections.abc import Callable
@@ -373,20 +374,40 @@ MECHANISMS: dict[str, Callable[[], None]] = {
 }
 
 
+#: the pictures of notebooks that other pages show, by number, as NAME_NUMBER.png
+SHOWN = {
+    "mesh_to_motion": (2,), "from_your_fe_program_to_a_motion": (2,), "suspension_arm": (0,), "railway_engine": (2,),
+    "landing_gear": (0,), "motor_bogie": (1,), "road_car": (1,), "mode_families": (10,), "vehicle_manoeuvres": (2,),
+    "slender_beams": (0,), "robot": (0,), "controlled_arm": (0,), "spacecraft_tower": (0,), "railway_stability": (0, 1),
+}  # fmt: skip
+
+
 def notebook(path: Path) -> None:
-    """Run a notebook and store its pictures."""
+    """Run a notebook, store what its cells show in it, and the pictures that other pages show."""
     import nbformat
     from nbclient import NotebookClient
 
     document = nbformat.read(path, as_version=4)
-    NotebookClient(document, timeout=1800, resources={"metadata": {"path": str(path.parent.parent)}}).execute()
-    for old in (HERE / "notebooks").glob(f"{path.stem}_*.png"):
-        old.unlink()
-    for k, cell in enumerate(document.cells):
-        shown = [output["data"] for output in cell.get("outputs", []) if "image/png" in output.get("data", {})]
-        for i, data in enumerate(shown):
-            picture = Image.open(io.BytesIO(base64.b64decode(data["image/png"])))
-            save_still(np.asarray(picture.convert("RGB")), HERE / "notebooks" / f"{path.stem}_{k}_{i}.png", width=900)
+    metadata = document.metadata
+    folder = {"metadata": {"path": str(path.parent.parent)}}
+    NotebookClient(document, timeout=1800, resources=folder, record_timing=False).execute()
+    document.metadata = metadata
+    pictures = []
+    for cell in document.cells:
+        if cell.cell_type == "code":
+            cell.outputs = [output for output in cell.outputs if output.get("name") != "stderr"]
+            for output in cell.outputs:
+                if "text" in output:
+                    output.text = re.sub(rf"{re.escape(tempfile.gettempdir())}/\w+/", "", output.text)
+                data = output.get("data", {})
+                if "image/png" in data:
+                    picture = Image.open(io.BytesIO(base64.b64decode(data["image/png"])))
+                    pictures.append(small(np.asarray(picture.convert("RGB")), width=900))
+                    data["image/png"] = base64.b64encode(pictures[-1]).decode("ascii")
+    nbformat.write(document, path)
+    for number in SHOWN.get(path.stem, ()):
+        (HERE / "notebooks" / f"{path.stem}_{number}.png").write_bytes(pictures[number])
+    print(f"{path.name}: {path.stat().st_size / 1e3:.0f} kB, {len(pictures)} pictures", flush=True)
 
 
 def drawn(system: ff.System) -> dict:
@@ -403,11 +424,17 @@ def cut(frame: np.ndarray) -> np.ndarray:
 
 def save_still(frame: np.ndarray, path: Path, *, width: int = WIDTH) -> None:
     """Write a picture with few colours."""
+    path.write_bytes(small(frame, width=width))
+    print(f"{path.name}: {path.stat().st_size / 1e3:.0f} kB", flush=True)
+
+
+def small(frame: np.ndarray, *, width: int) -> bytes:
+    """Return a picture with few colours as a PNG."""
     picture = Image.fromarray(frame)
     if picture.width > width:
         picture = picture.resize((width, round(picture.height * width / picture.width)), Image.Resampling.LANCZOS)
-    picture.quantize(COLORS, dither=Image.Dither.NONE).save(path, optimize=True)
-    print(f"{path.name}: {path.stat().st_size / 1e3:.0f} kB", flush=True)
+    picture.quantize(COLORS, dither=Image.Dither.NONE).save(stored := io.BytesIO(), format="PNG", optimize=True)
+    return stored.getvalue()
 
 
 def save_film(frames: list[np.ndarray], path: Path, *, fps: float) -> None:
