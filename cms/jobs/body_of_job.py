@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cms.errors import JobError
@@ -21,18 +22,19 @@ from fe_models.meshes.mesh import Mesh, drop_unused_nodes
 
 if TYPE_CHECKING:
     from fe_models.files.decks.deck import Deck
+    from fe_models.files.matrices.model import GivenArrays, GivenMatrices
     from fe_models.meshes.line_mesh import LineMesh
     from fe_models.meshes.selections import AnyMesh
     from fe_models.meshes.shell_mesh import ShellMesh
 
 __all__ = [
-    "body_of_matrices", "coupled_body", "is_of_mesh", "job_body", "mesh_of_job", "model_of_job", "shell_mesh",
+    "coupled_body", "is_of_mesh", "job_body", "mesh_of_job", "model_of_job", "shell_mesh",
     "uncoupled_body",
 ]  # fmt: skip
 
 
 def model_of_job(job: Job, stages: Stages, source: "Mesh | Deck | None" = None) -> FEModel:
-    """Return the model of a job with a mesh or a deck: what is read from the file, and the tables of the job.
+    """Return the model of a job: what is read from its mesh, deck or matrices, and its tables.
 
     Parameters
     ----------
@@ -49,6 +51,8 @@ def model_of_job(job: Job, stages: Stages, source: "Mesh | Deck | None" = None) 
             name, units, deck.mesh, job, mass=job.body.mass, plane=job.body.plane, accept=accept,
             lumped=deck.lumped, source=job.body.deck, are_faces_names=deck.is_plain_mesh,
         )  # fmt: skip
+    if job.body.matrices is not None:
+        return FEModel(name, units, matrices_of_job(job, stages), job, accept=accept)
     mesh: Any = source
     if mesh is None:
         with stages("read mesh" if job.mesh_size is None else "mesh"):
@@ -67,6 +71,25 @@ def model_of_job(job: Job, stages: Stages, source: "Mesh | Deck | None" = None) 
         materials=job.materials, solids=solids, interfaces=job.interfaces, load_cases=job.load_cases
     )
     return FEModel(name, units, mesh, tables, accept=accept)
+
+
+def matrices_of_job(job: Job, stages: Stages) -> "GivenMatrices | GivenArrays":
+    """Read the matrices of a job, and the deck or mesh that they need unless they contain node positions.
+
+    An .npz file of this project contains nodes and interfaces.
+    """
+    from fe_models.files.matrices.model import GivenArrays, GivenMatrices
+    from fe_models.files.read_matrices import read_matrices
+    from fe_models.files.read_mesh import read_geometry
+
+    body = job.body
+    if body.brings_interfaces:
+        return GivenArrays(Path(str(body.matrices)), held=bool(body.held), repair_mass=bool(body.repair_mass))
+    with stages("read matrices"):
+        read = read_matrices(body.matrices or (), names=body.names)
+    with stages("read geometry"):
+        geometry = None if body.geometry is None else read_geometry(body.geometry)
+    return GivenMatrices(read, geometry, bool(body.held), bool(body.remove_supports), bool(body.repair_mass))
 
 
 def mesh_of_job(job: Job) -> "AnyMesh":
@@ -162,55 +185,6 @@ def tied_body(
     return whole.with_load_cases(*load_cases_of(job.load_cases, whole, solid_mesh))
 
 
-# bodies whose elements are in another program: matrices, their geometry, and interfaces on it -------------------------
-
-
-def body_of_matrices(job: Job, stages: Stages, on_report: Callable[[Any], None] | None = None) -> FEBody:
-    """Read mass and stiffness matrices, and return a body with the interfaces and load cases of the job.
-
-    An .npz file of this project contains nodes and interfaces. All other files need a deck or a mesh, unless they
-    contain node positions. `on_report` is called with the `MatrixReport` before the matrices are checked.
-    """
-    if job.body.brings_interfaces:
-        return body_with_its_interfaces(job, stages)
-    from fe_models.files.matrices.body import MatrixReport, body_from_foreign, nodes_of, with_geometry
-    from fe_models.files.read_matrices import read_matrices
-    from fe_models.files.read_mesh import read_geometry
-
-    if job.body.matrices is None:
-        raise JobError("job: expected matrices, got none")
-    with stages("read matrices"):
-        read = read_matrices(job.body.matrices, names=job.body.names)
-    with stages("read geometry"):
-        geometry = nodes_of(read) if job.body.geometry is None else read_geometry(job.body.geometry)
-        read = with_geometry(read, geometry)
-        if on_report is not None:
-            on_report(MatrixReport(read))
-        interfaces = interfaces_of(job.interfaces, geometry)
-    with stages("check matrices"):
-        body = body_from_foreign(
-            read, geometry, name=str(job.body.name), units=UNIT_SYSTEMS[job.body.units], interfaces=interfaces,
-            held=bool(job.body.held), remove_supports=job.body.remove_supports, repair_mass=bool(job.body.repair_mass),
-            accept=[word for word in job.body.accept if word == "units"],
-        )  # fmt: skip
-    return body.with_load_cases(*load_cases_of(job.load_cases, body, geometry))
-
-
-def body_with_its_interfaces(job: Job, stages: Stages) -> FEBody:
-    """Read a body of bare matrices from a file that contains the interfaces."""
-    from pathlib import Path
-
-    from fe_models.files.matrices.given import body_from_npz
-
-    with stages("read matrices"):
-        body = body_from_npz(
-            Path(str(job.body.matrices)), name=job.body.name, units=UNIT_SYSTEMS[job.body.units],
-            held=bool(job.body.held), repair_mass=bool(job.body.repair_mass),
-            accept=[word for word in job.body.accept if word == "units"],
-        )  # fmt: skip
-        return body.with_load_cases(*load_cases_of(job.load_cases, body))
-
-
 # body of job ----------------------------------------------------------------------------------------------------------
 
 
@@ -262,13 +236,8 @@ def uncoupled_body(
     source: "Mesh | Deck | None" = None,
     ranks: Ranks | None = None,
 ) -> FEBody:
-    """Process a job up to the body with uncoupled interfaces, and with the requested nodes and points.
-
-    Its source is a deck, a shell, a frame, a solid mesh, or matrices.
-    """
-    if job.body.matrices is not None:
-        body = body_of_matrices(job, stages, on_report)
-    elif job.ties:
+    """Process a job up to the body with uncoupled interfaces, and with the requested nodes and points."""
+    if job.ties:
         body = tied_body(job, stages, on_report, source)
     else:
         model = model_of_job(job, stages, source)

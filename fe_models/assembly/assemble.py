@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from fe_models.assembly.constraints import Constraint, MeanMotion, NodeEquation, RigidNodes
 from fe_models.assembly.join import Joined, Part, join
 from fe_models.assembly.lumped import lumped_beams, lumped_shells
-from fe_models.assembly.model import LUMPED, FEModel, ModelTables
+from fe_models.assembly.model import LUMPED, FEModel, GivenElements, ModelTables
 from fe_models.assembly.rods import rod_body
 from fe_models.assembly.tables.attachments import (
     followers_of,
@@ -68,11 +68,12 @@ BEAM_TYPES = ("line", "line3")
 ATTACHED = ("masses", "springs", "links")
 #: tables of elements and attachments that a mesh of one kind of elements takes
 TABLES_OF_MESH: dict[type, tuple[str, ...]] = {
-    Mesh: ("solids",),
-    ShellMesh: ("shells", "sections", *ATTACHED),
-    LineMesh: ("sections", *ATTACHED),
+    Mesh: ("materials", "solids"),
+    ShellMesh: ("materials", "shells", "sections", *ATTACHED),
+    LineMesh: ("materials", "sections", *ATTACHED),
+    GivenElements: (),
 }
-COMMON_TABLES = ("materials", "interfaces", "load_cases")  #: tables that every mesh takes
+PLACES = ("interfaces", "load_cases")  #: tables that every model takes
 
 
 def assemble(
@@ -113,6 +114,8 @@ def assemble(
     if isinstance(model.mesh, RawMesh):
         return _joined_body(model, stages, on_report)
     _require_one_kind(model)
+    if isinstance(model.mesh, GivenElements):
+        return model.mesh.assembled(model, stages, on_report)
     tables, mesh = model.tables, model.mesh
     if isinstance(mesh, Mesh):
         rules = solid_properties(tables.solids, tables.materials, model.mass)
@@ -146,18 +149,17 @@ def _require_one_kind(model: FEModel) -> None:
     where = f"model {model.name!r}"
     kind = next((each for each in TABLES_OF_MESH if isinstance(model.mesh, each)), None)
     if kind is None:
-        expected = ", ".join(("RawMesh", *(each.__name__ for each in TABLES_OF_MESH)))
-        raise BodyError(f"{where}: mesh: expected one of {expected}, got {type(model.mesh).__name__}")
+        expected = ", ".join(("RawMesh", *(each.__name__ for each in TABLES_OF_MESH if each is not GivenElements)))
+        raise BodyError(f"{where}: mesh: expected one of {expected}, or matrices, got {type(model.mesh).__name__}")
+    name = type(model.mesh).__name__
     for key in ModelTables.model_fields:
-        if key not in (*COMMON_TABLES, *TABLES_OF_MESH[kind]) and getattr(model.tables, key):
-            raise BodyError(
-                f"{where}: {key}: a {kind.__name__} takes {', '.join(TABLES_OF_MESH[kind])} only; remove the "
-                "tables, or give a RawMesh"
-            )
+        if key not in (*PLACES, *TABLES_OF_MESH[kind]) and getattr(model.tables, key):
+            takes = ", ".join(each for each in (TABLES_OF_MESH[kind] or PLACES) if each != "materials")
+            raise BodyError(f"{where}: {key}: a {name} takes {takes} only; remove the tables, or give a RawMesh")
     if model.plane is not None:
         raise BodyError(f"{where}: plane: belongs to a RawMesh; remove it, and call fe_models.planar(couple(body))")
     if model.mass not in (None, "consistent") and kind is not Mesh:
-        raise BodyError(f"{where}: mass: a {kind.__name__} has consistent mass, got {model.mass!r}; give a RawMesh")
+        raise BodyError(f"{where}: mass: a {name} has consistent mass, got {model.mass!r}; give a RawMesh")
 
 
 def _joined_body(model: FEModel, stages: Stages, on_report: OnReport) -> FEBody:

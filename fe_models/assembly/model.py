@@ -4,10 +4,10 @@ Every source fills the same model: a job file, a deck of another program, or Pyt
 `fe_models.assemble` makes a body of it.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 from pydantic import Field
 
@@ -22,13 +22,15 @@ from fe_models.assembly.tables.beams import PLANES, BeamSection, RodSection
 from fe_models.assembly.tables.materials import MaterialSection, SolidSection, check_all, check_material
 from fe_models.assembly.tables.places import InterfaceSection, LoadCaseSection
 from fe_models.assembly.tables.shells import ShellSection, check_layups
+from fe_models.body.fe_body import FEBody
 from fe_models.foundation.errors import ArgumentError, BodyError
 from fe_models.foundation.records import checked_fields
+from fe_models.foundation.stages import Stages
 from fe_models.foundation.toml_file import Table, validated
 from fe_models.foundation.units import Units, unit_system
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["MASSES_OF_ALL", "FEModel", "ModelTables", "check_properties"]
+__all__ = ["MASSES_OF_ALL", "FEModel", "GivenElements", "ModelTables", "check_properties"]
 
 MASSES_OF_ALL = ("consistent", "lumped", "as the deck")  #: kinds of mass that a model may ask of all its elements
 LUMPED = ("lines", "shells", "rods")  #: kinds of elements whose mass may be lumped alone
@@ -51,6 +53,14 @@ class ModelTables(Table):
     load_cases: dict[str, LoadCaseSection] = Field({}, description="tables [load_cases.NAME]")
 
 
+@runtime_checkable
+class GivenElements(Protocol):
+    """Elements that another program has assembled, in place of a mesh."""
+
+    def assembled(self, model: "FEModel", stages: Stages, on_report: Callable[[Any], None] | None) -> FEBody:
+        """Return the body, with the interfaces and load cases of the model."""
+
+
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class FEModel:
@@ -64,7 +74,8 @@ class FEModel:
         Unit system of all numbers, or its name.
     mesh
         Nodes, cells of any kinds on shared nodes, and their groups (`RawMesh`); or a mesh of only solids (`Mesh`), of
-        shells with stiffeners (`ShellMesh`), or of lines (`LineMesh`).
+        shells with stiffeners (`ShellMesh`), or of lines (`LineMesh`); or matrices of another program
+        (`fe_models.files.GivenMatrices`, `GivenArrays`).
     tables
         What the groups are, by the keys of a job file: materials, solids, shells, sections, rods, masses, springs,
         links, couplings, equations, interfaces, load_cases.
@@ -141,7 +152,8 @@ class FEModel:
                 raise BodyError(f"{where}: lumped: unknown {quoted(kind)}{nearest(kind, LUMPED)}")
         made = validated(ModelTables, tables, where, BodyError)
         try:
-            check_properties(made)
+            if not isinstance(mesh, GivenElements):
+                check_properties(made)
         except ValueError as problem:
             raise BodyError(f"{where}: {problem}") from None
         return cls(name, unit_system(units), mesh, made, **fields)

@@ -10,6 +10,8 @@ from .matrices.body import body_from_foreign as body_from_foreign
 from .matrices.foreign_matrices import ForeignMatrices as ForeignMatrices
 from .matrices.given import body_from_matrices as body_from_matrices
 from .matrices.given import body_from_npz as body_from_npz
+from .matrices.model import GivenArrays as GivenArrays
+from .matrices.model import GivenMatrices as GivenMatrices
 from .read_matrices import read_matrices as read_matrices
 from .read_mesh import read_geometry as read_geometry
 from .skfem_body import body_from_skfem as body_from_skfem

@@ -1,5 +1,6 @@
 """A model given by tables is the body that the functions for one kind of elements return."""
 
+import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
@@ -64,7 +65,7 @@ RULES = {"left": "full", "right": "incompatible"}
         ),
         ({"sections": {"s": ROUND, "t": ROUND}}, r'sections\.s: lines = "all", but there are 2 tables'),
         ({"mass": "as the deck", "lumped": {"lines", "shell"}}, "lumped: unknown 'shell'; did you mean 'shells'"),
-        ({"mesh": None}, r"mesh: expected one of RawMesh, Mesh, ShellMesh, LineMesh, got NoneType"),
+        ({"mesh": None}, r"mesh: expected one of RawMesh, Mesh, ShellMesh, LineMesh, or matrices, got NoneType"),
     ],
 )
 def test_what_a_mesh_of_lines_cannot_take_is_refused(change, message):
@@ -77,4 +78,33 @@ def test_two_formulations_on_one_mesh_of_solids_are_refused():
     halves = {name: {"cells": f"{name} half", "integration": rule} for name, rule in RULES.items()}
     model = FEModel.of("box", box_mesh(2, 1, 1), units="m-kg-s", materials={"steel": STEEL}, solids=halves)
     with pytest.raises(BodyError, match="solids: a Mesh takes one integration and mass, got 2"):
+        fm.assemble(model)
+
+
+@pytest.fixture
+def read():
+    """Matrices of a bar, as files of another program give them."""
+    body = fm.solid_body(box_mesh(), MATERIAL, name="bar", units=UNITS)
+    numbers = np.arange(1, len(body.nodes) + 1)
+    dofs = np.column_stack([numbers[body.dofs[:, 0]], body.dofs[:, 1]])
+    return fm.files.ForeignMatrices(K=body.K, M=body.M, dofs=dofs, nodes=body.nodes, node_numbers=numbers)
+
+
+def test_matrices_in_place_of_a_mesh_make_the_body_that_they_make_alone(read):
+    places = {"left": {"nodes": [1, 2, 3], "kind": "rigid"}}
+    body = fm.assemble(FEModel.of("bar", fm.files.GivenMatrices(read), units="m-kg-s", interfaces=places))
+    require_equal(body, fm.files.body_from_foreign(read, name="bar", units=UNITS))
+    assert [(each.name, list(each.nodes)) for each in body.interfaces] == [("left", [0, 1, 2])]
+
+
+def test_tables_of_elements_beside_matrices_are_refused(read):
+    model = FEModel.of("bar", fm.files.GivenMatrices(read), units="m-kg-s", materials={"steel": STEEL})
+    with pytest.raises(BodyError, match="materials: a GivenMatrices takes interfaces, load_cases only"):
+        fm.assemble(model)
+
+
+def test_interfaces_beside_an_archive_that_brings_them_are_refused(tmp_path):
+    arrays = fm.files.GivenArrays(tmp_path / "bar.npz")
+    model = FEModel.of("bar", arrays, units="m-kg-s", interfaces={"a": {"nodes": [1], "kind": "rigid"}})
+    with pytest.raises(BodyError, match=r"interfaces: .*bar.npz brings its own"):
         fm.assemble(model)
