@@ -18,6 +18,7 @@ SLOWEST = tuple(
         "docs/test_tutorials",
         "cms/cli/test_commands", "pipeline/test_split_line", "floatframe/engine/structure_preserving/test_every_part",
         "floatframe/test_own_kinds", "floatframe/laws/test_every_constant",
+        "floatframe/engine/kernels/compiler/test_interpreted",
         "floatframe/engine/compiling/test_lean_laws", "floatframe/machines/test_road_car",
         "floatframe/design/laboratory/test_laboratory",
         "floatframe/design/generation/test_generate", "test_groups",

@@ -11,7 +11,7 @@ from numba import types
 
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.stages import announced_compilation
-from floatframe.engine.kernels.compiler.choice import compiler, is_lean, words
+from floatframe.engine.kernels.compiler.choice import compiler, is_interpreted, is_lean, words
 from floatframe.engine.kernels.compiler.compilation import kept_entry
 from floatframe.engine.kernels.compiler.sources import source_digest
 from floatframe.engine.kernels.compiler.structure import converter, table_of_numbers
@@ -141,7 +141,7 @@ class CompiledEntry:
     def __init__(self, make: Callable[[int], Any], module: str, n_records: int) -> None:
         self.compiled = make(source_digest(module, compiler))
         self.signature = (types.Array(types.int64, 1, "C"),) * (n_records + 3)
-        self.is_ready = False
+        self.is_ready = is_interpreted
 
     def prepare(self) -> bool:
         """Load the kernels from the cache, or compile them; return whether they were compiled in this call.

@@ -3,6 +3,9 @@
 The lean compiler (kernels/compiler/lean.py) replaces inner parts of numba, which change from one version to the next.
 Plain numba compiles the same kernels with any version that the project supports. The compilation, which happens once,
 takes several times as long, and a step takes somewhat longer (docs/multibody.md has the figures).
+
+Kernels can also run as plain Python (kernels/compiler/interpreted.py), with checked indices, for debugging and as a
+reference for both compilers.
 """
 
 import os
@@ -12,11 +15,11 @@ from numba.core import config
 
 from floatframe.errors import FloatframeError
 
-__all__ = ["KNOWN_VERSIONS", "VARIABLE", "compiler", "is_lean", "level", "words"]
+__all__ = ["KNOWN_VERSIONS", "VARIABLE", "compiler", "is_interpreted", "is_lean", "level", "words"]
 
 KNOWN_VERSIONS = ("0.68",)  #: versions of numba whose internals the lean compiler supports
 VARIABLE = "FLOATFRAME_COMPILER"  #: environment variable that selects one of `CHOICES`
-CHOICES = ("lean", "plain")
+CHOICES = ("lean", "plain", "interpreted")
 
 installed = ".".join(numba.__version__.split(".")[:2])
 
@@ -35,6 +38,7 @@ def chosen() -> str:
 
 
 is_lean = chosen() == "lean"
+is_interpreted = chosen() == "interpreted"
 level = int(config.OPT)  # type: ignore[attr-defined]  #: level of optimisation, from NUMBA_OPT
 compiler = f"{chosen()} at level {level}"  #: the settings that determine the machine code of a given source
 
@@ -43,6 +47,8 @@ def words() -> str:
     """Describe how the kernels are compiled, in one line for the user."""
     if is_lean:
         return f"lean, with numba {numba.__version__}"
+    if is_interpreted:
+        return f"interpreted as Python with checked indices (requested by {VARIABLE})"
     asked = f"requested by {VARIABLE}"
     why = asked if os.environ.get(VARIABLE) else f"the faster lean compiler needs numba {', '.join(KNOWN_VERSIONS)}"
     return f"plain, with numba {numba.__version__} ({why})"

@@ -8,14 +8,25 @@
     entry           a function that Python calls
     kept_entry      an entry with one signature, which is compiled in each process if it cannot be cached on disk
 
-The lean compiler compiles them if it supports the installed numba, otherwise plain numba; see
-kernels/compiler/choice.py.
+The lean compiler compiles them if it supports the installed numba, otherwise plain numba. To debug kernels, they can
+run as Python; see kernels/compiler/choice.py.
 """
 
-from floatframe.engine.kernels.compiler.choice import is_lean
+from floatframe.engine.kernels.compiler.choice import is_interpreted, is_lean
 
 if is_lean:
     from floatframe.engine.kernels.compiler.lean import (
+        array_type,
+        array_value,
+        entry,
+        inner,
+        loops,
+        matrix_loops,
+        small,
+        view,
+    )
+elif is_interpreted:
+    from floatframe.engine.kernels.compiler.interpreted import (
         array_type,
         array_value,
         entry,

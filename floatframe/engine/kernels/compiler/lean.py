@@ -284,6 +284,7 @@ class EntryLibrary(JITCodeLibrary):
         for library in self._linking_libraries:
             with_callees(library, libraries)
         self._linking_libraries = list(libraries)
+        require_own_symbols(self._linking_libraries)
         super().finalize()
 
     def _optimize_final_module(self):
@@ -301,6 +302,17 @@ def with_callees(library, known):
         known[library] = None
         for other in library._linking_libraries:
             with_callees(other, known)
+
+
+def require_own_symbols(libraries):
+    """Raise `RuntimeError` if two inner functions have one symbol: the linker would keep one and drop the other."""
+    owners: dict = {}
+    for library in libraries:
+        if isinstance(library, InnerLibrary):
+            for function in library._final_module.functions:
+                is_seen = not function.is_declaration and function.linkage != Linkage.internal
+                if is_seen and owners.setdefault(function.name, library) is not library:
+                    raise RuntimeError(f"two inner functions named {library.name} have one symbol: {function.name}")
 
 
 def variables_in(self, part):

@@ -19,7 +19,9 @@ from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, low
 from numba.np.arrayobj import make_array
 
 from fe_models.foundation.arrays import Array, IntArray
+from floatframe.engine.kernels.compiler.choice import is_interpreted
 from floatframe.engine.kernels.compiler.compilation import array_type, array_value
+from floatframe.engine.kernels.compiler.interpreted import record_at
 from floatframe.engine.kernels.records import Declared
 
 __all__ = ["Structure", "converter", "n_words", "table_of_numbers"]
@@ -102,7 +104,9 @@ def set_field(context, builder, signature, arguments, name):
 
 
 def converter(declaration):
-    """Return a compiled function that converts a table to the structure of a declaration."""
+    """Return the function of kernels that converts a table to the structure of a declaration."""
+    if is_interpreted:
+        return lambda table: record_at(declaration, table)
     structure = Structure(declaration)
 
     @intrinsic

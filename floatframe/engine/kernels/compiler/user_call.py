@@ -1,11 +1,14 @@
 """Calls from the kernels to a user's function by its address, which need no compilation of the kernels."""
 
+import ctypes
 from typing import Any
 
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
+
+from floatframe.engine.kernels.compiler.choice import is_interpreted
 
 __all__ = ["call_law", "call_user_function"]
 
@@ -37,5 +40,16 @@ def call_law_by_address(typing_context, address, head, inputs, data, outputs):
     return types.void(address, head, inputs, data, outputs), write_call
 
 
-call_user_function: Any = intrinsic(call_by_address)  #: call in kernels: call_user_function(address, inputs, outputs)
-call_law: Any = intrinsic(call_law_by_address)  #: call in kernels: call_law(address, head, inputs, data, outputs)
+def call_from_python(address, *arrays):
+    """Call the C function at an address with pointers to the arrays, in interpreted kernels."""
+    function = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * len(arrays))(int(address))
+    function(*[array.ctypes.data for array in arrays])
+
+
+def kernel_call(typed_call: Any) -> Any:
+    """Return what kernels call."""
+    return call_from_python if is_interpreted else intrinsic(typed_call)
+
+
+call_user_function: Any = kernel_call(call_by_address)  #: call in kernels: call_user_function(address, inputs, outputs)
+call_law: Any = kernel_call(call_law_by_address)  #: call in kernels: call_law(address, head, inputs, data, outputs)

@@ -133,4 +133,4 @@ def test_small_kernels_are_compiled_plainly_at_every_change_and_motions_in_the_l
 
 def test_other_checks_compile_as_the_user_does():
     assert environment(KERNELS).get(VARIABLE) == os.environ.get(VARIABLE)
-    assert set(CHOICES) == {"lean", "plain"}
+    assert set(CHOICES) == {"lean", "plain", "interpreted"}

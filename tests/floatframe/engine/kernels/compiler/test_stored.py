@@ -7,8 +7,9 @@ import time
 import pytest
 from numba import float64, int64
 from numba.core import types
+from numba.core.bytecode import FunctionIdentity
 
-from floatframe.engine.kernels.compiler import stored
+from floatframe.engine.kernels.compiler import lean, stored
 from floatframe.engine.kernels.compiler.lean import InnerLibrary, entry, inner, loops
 from floatframe.engine.kernels.compiler.stored import code_key, delete_old
 from floatframe.engine.kernels.joints.row_formulas import by_code
@@ -98,6 +99,23 @@ def test_functions_of_one_name_with_other_values_are_kept_apart(written):
     for factor in (2.0, 3.0, 2.0):
         assert made(FACTOR=factor)["run"](4.0) == 4.0 * factor + 0.5 - 1.0 + 4.0
     assert len(written) == 3 + 2
+
+
+def with_symbol_of_name(function, key):
+    """Return the identity of a function whose symbol depends only on its name and types."""
+    known = FunctionIdentity.from_function(function)
+    known.unique_id, known.unique_name = 1, known.func_qualname
+    return known
+
+
+def test_functions_with_one_symbol_are_refused_and_not_merged(monkeypatch):
+    """The linker would keep one of them, so that twice its value is returned."""
+    monkeypatch.setattr(lean, "identity", with_symbol_of_name)
+    monkeypatch.setattr(lean, "code_key", lambda *arguments: None)
+    double, triple = (made(FACTOR=factor)["called"] for factor in (2.0, 3.0))
+    with pytest.raises(RuntimeError, match="two inner functions named called have one symbol"):
+        entry(lambda x: double(x) + triple(x), cache=False)(1.0)
+    assert entry(lambda x: double(x) + double(x), cache=False)(1.0) == 5.0
 
 
 def test_code_that_lost_a_called_function_or_is_damaged_is_compiled_again(written, tmp_path):
