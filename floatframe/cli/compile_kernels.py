@@ -53,10 +53,11 @@ def make_cholesky() -> None:
     """Factorise a matrix by the fronts of this package, as large definite matrices are."""
     import scipy.sparse as sp
 
+    from cms.linear_algebra.solvers.factorization import lower_triangle
     from cms.linear_algebra.sparse_cholesky.factor import CholeskyFactor
 
     line = sp.diags_array([-1.0, 2.1, -1.0], offsets=[-1, 0, 1], shape=(12, 12))
-    lower = sp.csc_array(sp.tril(sp.kronsum(sp.kronsum(line, line), line)))
+    lower = lower_triangle(sp.csc_array(sp.kronsum(sp.kronsum(line, line), line)))
     factor = CholeskyFactor(lower)
     for columns in (1, 16):
         factor.solve(np.ones((lower.shape[0], columns)))

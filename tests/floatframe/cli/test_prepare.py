@@ -1,7 +1,12 @@
+import os
+import subprocess
+import sys
+
 import pytest
 
 from floatframe.cli import prepare
 from floatframe.cli.compile_kernels import PARTS
+from tests.root import ROOT
 
 SAYS = """
 import json, sys, time
@@ -36,3 +41,37 @@ def test_a_part_that_fails_says_why_and_leaves_the_others():
 
 def test_later_parts_are_parts():
     assert {*prepare.LATER, *prepare.LATER.values()} <= set(PARTS)
+
+
+#: prints the functions of which a larger factor, in memory and on disk, needs more code than `prepare` compiles
+FACTORS = """
+import numpy as np
+from numba.core.dispatcher import Dispatcher
+from cms.linear_algebra.solvers.factorization import lower_triangle
+from cms.linear_algebra.sparse_cholesky import front_kernels, kernels
+from cms.linear_algebra.sparse_cholesky.factor import CholeskyFactor
+from floatframe.cli.compile_kernels import PARTS
+from tests.cms.linear_algebra.sparse_cholesky.examples import grid
+
+def compiled():
+    named = {**vars(kernels), **vars(front_kernels)}.items()
+    return {(name, kind) for name, each in named if isinstance(each, Dispatcher) for kind in each.signatures}
+
+PARTS["cholesky"][1]()
+before = compiled()
+for on_disk in (False, True):
+    factor = CholeskyFactor(lower_triangle(grid(15, dofs=3)), on_disk=on_disk)
+    for columns in (1, 2, 40):
+        factor.solve(np.ones((3 * 15**3, columns)))
+    factor.close()
+print(len(before), sorted(name for name, _ in compiled() - before))
+"""
+
+
+def test_a_large_factor_needs_no_more_code_than_prepare_compiles():
+    known = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, "-c", FACTORS], env=known, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    n_functions, _, more = done.stdout.strip().partition(" ")
+    assert int(n_functions) > 5
+    assert more == "[]"

@@ -1,8 +1,8 @@
 """Kernels as plain Python, without a compiler: a reference for compiled kernels, and a debugger of kernels.
 
-The names are those of kernels/compiler/lean.py, where their purpose is described. Nothing is compiled, so a step takes
-several thousand times as long. An index outside an array raises `IndexError`, whose traceback names the kernel, the line
-and the array; compiled kernels would read or write other memory. Breakpoints and `print` work in kernels.
+The names are those of kernels/compiler/lean.py, where their purpose is described. Nothing is compiled, and a step takes
+about a thousand times as long. An index outside an array raises `IndexError`, which names the array, and the kernel and
+line in its traceback; compiled kernels would use other memory. Breakpoints and `print` work in kernels.
 """
 
 import ctypes
@@ -113,7 +113,7 @@ class RecordView:
 
 def record_at(declaration, table) -> RecordView:
     """Return the view of a record whose addresses and shapes are in a table."""
-    return view_of(type(declaration), tuple(table.tolist()))
+    return view_of(type(declaration), tuple(table.tolist()))  # type: ignore[arg-type]
 
 
 @lru_cache(maxsize=64)
