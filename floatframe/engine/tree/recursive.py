@@ -278,7 +278,7 @@ class RelativeModel:
         engine = e.compiled.placed if state is None else state_of_engine(e.compiled, state)
         z = positions_of_state(e, engine)
         columns = [self.engine_state(z, rate).u for rate in np.eye(self.n_rates)]
-        T = np.array(columns).reshape(self.n_rates, -1).T
+        T = np.array(columns).reshape(self.n_rates, len(engine.u)).T
         return z, np.asarray(np.linalg.lstsq(T, engine.u, rcond=None)[0], dtype=float)
 
     def moved(self, z: Array, dz: Array) -> Array:

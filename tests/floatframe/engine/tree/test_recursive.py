@@ -272,6 +272,13 @@ def test_systems_that_are_no_trees_under_gravity_are_refused(system, words):
         ff.analyses.relative_model(system)
 
 
+def test_a_tree_that_cannot_move_has_no_positions_and_no_mass():
+    fixed = ff.System([ff.RigidBody("block", 2.0, np.eye(3))], [ff.FixedJoint("weld", ff.GROUND, ff.Marker("block"))])
+    model = ff.analyses.relative_model(fixed)
+    z, z_dot = model.positions()
+    assert (z.shape, z_dot.shape, model.mass_matrix(z).shape) == ((0,), (0,), (0, 0))
+
+
 def test_numbers_that_do_not_fit_are_refused():
     model = ff.analyses.relative_model(pendulum())
     with pytest.raises(ModelError, match="z: expected 1 finite numbers, got shape"):
