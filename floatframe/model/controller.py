@@ -25,6 +25,8 @@ from floatframe.model.checked_values import number
 
 __all__ = ["Controller"]
 
+MATRICES = ("A", "B", "C", "D", "dt")  #: attributes of a discrete state space
+
 
 @presented
 @frozen_copies
@@ -73,6 +75,11 @@ class Controller:
             if not names or len(set(names)) < len(names):
                 raise ModelError(f"{where}: {part}: expected names, each once, got {list(names)}")
             object.__setattr__(self, part, names)
+        if all(hasattr(self.function, part) for part in MATRICES):
+            raise ModelError(
+                f"{where}: function: got a state space; take Controller.of_state_space({self.name!r}, model, "
+                "inputs=..., outputs=...)"
+            )
         if not callable(self.function):
             raise ModelError(f"{where}: function: expected a callable, got {self.function!r}")
         if self.state is not None:
@@ -96,7 +103,7 @@ class Controller:
         inputs, outputs
             Names of the inputs and outputs, in the order of the model.
         state
-        Initial state z; None: zero.
+            Initial state z; None: zero.
 
         Raises
         ------
@@ -104,7 +111,7 @@ class Controller:
             If the model is not discrete with a period, or the numbers of inputs and outputs differ from it.
         """
         where = f"controller {name!r}"
-        missing = [part for part in ("A", "B", "C", "D", "dt") if not hasattr(model, part)]
+        missing = [part for part in MATRICES if not hasattr(model, part)]
         if missing:
             raise ModelError(
                 f"{where}: model: expected a discrete state space with A, B, C, D and dt, got {type(model).__name__}"

@@ -309,6 +309,14 @@ def test_an_unfit_state_space_is_refused(change, words):
         Controller.of_state_space("pid", 3, inputs="pin.angle", outputs="motor")
 
 
+@pytest.mark.parametrize("period", [PERIOD, None])
+def test_a_state_space_in_place_of_the_function_is_refused_with_the_way(period):
+    """A state space of python-control can be called too, with a frequency."""
+    model = pytest.importorskip("control").ss(A, B, C, D, period)
+    with pytest.raises(ModelError, match=r"controller 'pid': function: got a state space; take Controller.of_state_sp"):
+        pid(function=model)
+
+
 # Refused by name ------------------------------------------------------------------------------------------------------
 
 
