@@ -119,6 +119,15 @@ def commands(name: str, help: str, *, hints: Mapping[str, str] | None = None) ->
     known = hints or {}
 
     class Hinting(TyperGroup):
+        def get_params(self, ctx: Any) -> list[Any]:
+            params = super().get_params(ctx)
+            for param in params:
+                if param.name == "show_completion":
+                    param.hidden = True  # type: ignore[attr-defined]
+                if param.name == "install_completion":
+                    param.help = "Complete words in this shell."  # type: ignore[attr-defined]
+            return params
+
         def resolve_command(self, ctx: Any, args: list[str]) -> Any:
             if args[0] in known:
                 given = " ".join(args[1:])
@@ -134,7 +143,7 @@ def commands(name: str, help: str, *, hints: Mapping[str, str] | None = None) ->
     @app.callback()
     def options(
         version: bool = version_option(name),
-        debug: bool = typer.Option(False, "--debug", help="Show the traceback of a fault of the program."),
+        debug: bool = typer.Option(False, "--debug", help="Show tracebacks of faults."),
     ) -> None:
         show_tracebacks.set(debug)
 

@@ -47,6 +47,7 @@ app = commands(
     "floatframe",
     "Flexible multibody dynamics: bodies from modal files, joints and forces become motion.",
     hints={
+        "demo": "cms demo",
         "eig": "floatframe modes FILE",
         "study": "floatframe compare FILE",
         "machine": "floatframe example NAME",
@@ -169,7 +170,7 @@ def resume_command(
 
 def compute(name: str, path: Path, run: "Callable[[Callable[[Progress], None]], Trajectory]") -> None:
     """Run a motion with a progress bar; print a summary, or the location of the partial results if interrupted."""
-    from floatframe.results.results_file import segments_folder
+    from floatframe.results.results_file import segments_folder, segments_words
 
     try:
         with stages(remaining=True) as clock:
@@ -182,9 +183,7 @@ def compute(name: str, path: Path, run: "Callable[[Callable[[Progress], None]], 
                 trajectory = run(on_progress)
     except KeyboardInterrupt:
         segments = segments_folder(path.resolve())
-        kept = (
-            f"the motion so far is in {segments}, which plot, animate and info can read; floatframe resume continues it"
-        )
+        kept = f"{segments_words(segments)}; floatframe resume continues it"
         print_error(f"interrupted; {kept if segments.is_dir() else 'nothing was written'}")
         raise typer.Exit(INTERRUPTED) from None
     print_run(trajectory)

@@ -30,6 +30,7 @@ __all__ = [
     "row_shapes",
     "segment_paths",
     "segments_folder",
+    "segments_words",
     "validity_text",
 ]
 
@@ -128,6 +129,11 @@ def segments_folder(path: str | os.PathLike[str]) -> Path:
     """Return the folder of the segments of a results file; the folder itself is also accepted."""
     path = Path(path)
     return path if path.name.endswith(SEGMENTS) else path.with_name(path.name + SEGMENTS)
+
+
+def segments_words(folder: Path) -> str:
+    """Return where the motion of a run that ended early is, and what can read it, for messages."""
+    return f"the motion so far is in {str(folder)!r}, which floatframe plot, animate and info can read"
 
 
 def segment_paths(folder: Path) -> list[Path]:

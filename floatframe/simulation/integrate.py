@@ -40,7 +40,7 @@ from floatframe.model.state import State
 from floatframe.model.system import System
 from floatframe.results.head import Head
 from floatframe.results.motion import Motion, motion_of
-from floatframe.results.results_file import MemorySource, validity_text
+from floatframe.results.results_file import MemorySource, segments_words, validity_text
 from floatframe.results.sensors import measured
 from floatframe.results.trajectory import Trajectory, read_trajectory
 from floatframe.results.validity import ValidityNote, notes_from_json, notes_to_json
@@ -666,6 +666,4 @@ def motion_so_far(run: Run) -> tuple[Motion, str]:
         arrays = MemorySource(joint_rows(run.system, run.kept))
         return Motion(run.head, arrays, is_complete=False, validity=run.watch.notes, known=run.system), ""
     run.writer.close_segment()
-    return motion_of(
-        read_trajectory(run.writer.folder), run.system
-    ), f"; the motion so far is in {str(run.writer.folder)!r}"
+    return motion_of(read_trajectory(run.writer.folder), run.system), f"; {segments_words(run.writer.folder)}"

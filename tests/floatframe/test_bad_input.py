@@ -88,11 +88,19 @@ def test_a_drive_against_what_the_joints_hold_is_named():
 def test_a_drive_past_the_reach_of_the_mechanism_tells_time_joint_and_advice_and_keeps_the_results(tmp_path):
     """The block goes outward from 0.566 to 0.8 = crank + rod, the dead point, which it reaches after 0.047 at 5."""
     message = refused(tmp_path, CRANK.replace("\n[run]", PUSH.format(0.565685424949, 5.0) + "\n[run]"))
-    for words in ("from t = 0.0", "joint 'g", "singular position", "a drive out of reach", "the motion so far is in"):
+    for words in (
+        "from t = 0.0",
+        "joint 'g",
+        "singular position",
+        "a drive out of reach",
+        "the motion so far is in",
+        "which floatframe plot, animate and info can read",
+    ):
         assert words in message
     assert (tmp_path / "crank.h5.segments").is_dir()
-    result = CliRunner().invoke(app, ["info", str(tmp_path / "crank.h5.segments")])
-    assert result.exit_code == 0
+    for command in ("plot", "info"):
+        result = CliRunner().invoke(app, [command, str(tmp_path / "crank.h5.segments")])
+        assert result.exit_code == 0
     assert "did not reach its end" in result.stdout
 
 

@@ -37,7 +37,7 @@ from floatframe.model.joints.rows import is_held, is_held_velocity
 from floatframe.model.state import State
 from floatframe.model.system import System
 from floatframe.results.motion import Motion, motion_of
-from floatframe.results.results_file import MemorySource
+from floatframe.results.results_file import MemorySource, segments_words
 from floatframe.results.small_motions.joint_rates import coordinate_rows, driven_coordinates
 from floatframe.results.trajectory import read_trajectory
 from floatframe.results.writer import ResultsPlace, ResultsWriter
@@ -234,7 +234,7 @@ def kinematics(
             else:
                 writer.close_segment()
                 error.trajectory = motion_of(read_trajectory(writer.folder), system)
-                error.args = (f"{error}; the motion so far is in {str(writer.folder)!r}",)
+                error.args = (f"{error}; {segments_words(writer.folder)}",)
             raise
         except BaseException:
             if writer is not None:

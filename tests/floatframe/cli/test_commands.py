@@ -307,6 +307,7 @@ def test_help_names_the_commands_and_loads_nothing_heavy():
 @pytest.mark.parametrize(
     ("program", "name", "now"),
     [
+        (app, "demo", "cms demo."),
         (app, "eig", "floatframe modes swing.toml."),
         (app, "study", "floatframe compare swing.toml."),
         (app, "reduce", "cms reduce swing.toml."),
@@ -320,6 +321,15 @@ def test_a_command_under_another_name_is_answered_with_its_name_here(program, na
     result = CliRunner().invoke(program, [name, "swing.toml"])
     assert result.exit_code == 2
     assert f"No such command '{name}'. Use {now}" in " ".join(result.output.replace("│", " ").split())
+
+
+@pytest.mark.parametrize("program", [app, cms_app])
+def test_the_help_of_a_program_fits_a_screen_of_52_lines(program):
+    """In 80 columns; each command has one line, in the group of its work."""
+    shown = CliRunner().invoke(program, ["--help"], env={"COLUMNS": "80"}).output
+    lines = [line for line in shown.splitlines() if line.strip()]
+    assert 40 < len(lines) <= 52
+    assert max(map(len, lines)) <= 80
 
 
 @pytest.mark.parametrize(("name", "meant"), [("machine", "example NAME"), ("urdf", "export FILE --to urdf")])
