@@ -8,6 +8,9 @@
 
 The recovery has a row for each dof of the parts. It also has rows for components that only a constraint gives to a node
 (all six of a leader that belongs to no part). Such a node moves in pictures and sensors as its interface does.
+
+Parts have neither interfaces nor multipliers. `fe_models.body.weld` joins coupled bodies, which have both: their dofs
+stay apart, and those of one interface follow the other.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -27,7 +30,7 @@ from fe_models.assembly.constraints import (
 from fe_models.body.elimination import eliminate_dofs
 from fe_models.body.fe_body import MULTIPLIER, FEBody, MeanNode, Recovery
 from fe_models.body.rigid_motion import MassLoads
-from fe_models.body.weld import WeldedModel, block_damping, points_side_by_side
+from fe_models.body.weld import WeldedModel, side_by_side
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
 from fe_models.meshes.numbering import NO_NUMBERS, NONE, NamedSet, Numbering, numbering_side_by_side
@@ -238,47 +241,36 @@ def _shared_dofs(parts: Sequence[Part], place: IntArray, leaders: IntArray) -> t
 
 
 def _side_by_side(name: str, bodies: list[FEBody], S: sp.csr_array, dofs: IntArray, nodes: Array) -> FEBody:
-    first = np.cumsum([0, *(len(body.nodes) for body in bodies)])
-    recoveries = [body.to_mesh for body in bodies]
+    parts = side_by_side(bodies)
     loose = np.flatnonzero(np.diff(S.tocsc().indptr) == 0)  # dofs of leaders that are in no part
     own = sp.csr_array((np.ones(len(loose)), (np.arange(len(loose)), loose)), shape=(len(loose), len(dofs)))
-    n_mesh_dof = tuple(int(recovery.matrix.shape[0]) for recovery in recoveries)
-    models = [body.element_model for body in bodies]
-    damping = block_damping(bodies)
+    n_added = len(nodes) - len(parts["nodes"])
+    model, recovery = parts["element_model"], parts["recovery"]
+    if model is not None:
+        model = WeldedModel(
+            (*model.parts, MasslessNodes(len(loose), n_added)),
+            (*model.n_mesh_dof, len(loose)),
+            (*model.n_nodes, n_added),
+        )
     volumes = [np.zeros(len(b.nodes)) if b.node_volumes is None else b.node_volumes for b in bodies]
-    n_added = len(nodes) - int(first[-1])
-    has_volumes = any(volume.any() for volume in volumes)
-    counts = tuple(len(body.nodes) for body in bodies)
-    return FEBody(
-        name=name,
-        M=S.T @ sp.block_diag([body.M for body in bodies], format="csc") @ S,
-        K=S.T @ sp.block_diag([body.K for body in bodies], format="csc") @ S,
-        D=None if damping is None else S.T @ damping @ S,
-        nodes=nodes,
-        dofs=dofs,
-        units=bodies[0].units,
-        surface=np.concatenate([body.surface + begin for body, begin in zip(bodies, first, strict=False)]),
-        element_model=None
-        if any(model is None for model in models)
-        else WeldedModel(
-            (*(model for model in models if model is not None), MasslessNodes(len(loose), n_added)),
-            (*n_mesh_dof, len(loose)),
-            (*counts, n_added),
+    whole = {
+        "M": S.T @ parts.pop("M") @ S,
+        "K": S.T @ parts.pop("K") @ S,
+        "D": None if parts["D"] is None else S.T @ parts["D"] @ S,
+        "nodes": nodes,
+        "dofs": dofs,
+        "element_model": model,
+        "recovery": Recovery(
+            sp.vstack([recovery.matrix @ S, own], "csr"), np.concatenate([recovery.dofs, dofs[loose]])
         ),
-        recovery=Recovery(
-            sp.vstack([sp.block_diag([recovery.matrix for recovery in recoveries], format="csr") @ S, own], "csr"),
-            np.concatenate(
-                [*(r.dofs + np.array([n, 0]) for r, n in zip(recoveries, first, strict=False)), dofs[loose]]
-            ),
-        ),
-        stress_points=points_side_by_side(bodies, n_mesh_dof),
-        node_volumes=np.concatenate([*volumes, np.zeros(n_added)]) if has_volumes else None,
-        provenance={
+        "node_volumes": np.concatenate([*volumes, np.zeros(n_added)]) if any(v.any() for v in volumes) else None,
+        "provenance": {
             f"{body.name}: {key}" if len(bodies) > 1 else key: value
             for body in bodies
             for key, value in body.provenance.items()
         },
-    )
+    }
+    return FEBody(name=name, **parts | whole)
 
 
 def recovered_dofs(body: FEBody) -> IntArray:

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,7 +16,7 @@ from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
 from fe_models.meshes.numbering import numbering_side_by_side
 
-__all__ = ["WeldedModel", "WeldedPoints", "block_damping", "mesh_rows", "points_side_by_side", "weld"]
+__all__ = ["WeldedModel", "WeldedPoints", "mesh_rows", "side_by_side", "weld"]
 
 Place = tuple[str, str]  #: name of a body, and name of its interface
 
@@ -233,31 +234,12 @@ def _side_by_side(
         f[start[body.name][0] :][: body.n_dof] = case.f
         own_name = f"{body.name}.{case.name}" if case_names.count(case.name) > 1 else case.name
         load_cases.append(LoadCase(own_name, case.kind, f))
-    recoveries = [body.to_mesh for body in bodies]
     volumes = [body.node_volumes for body in bodies]
-    n_mesh_dof = tuple(int(recovery.matrix.shape[0]) for recovery in recoveries)
-    models = [body.element_model for body in bodies]
+    n_mesh_dof = [len(body.to_mesh.dofs) for body in bodies]
     return FEBody(
         name=name,
-        M=sp.block_diag([body.M for body in bodies], format="csc"),
-        K=sp.block_diag([body.K for body in bodies], format="csc"),
-        D=block_damping(bodies),
-        nodes=np.concatenate([body.nodes for body in bodies]),
-        dofs=_numbered([body.dofs for body in bodies], first_node),
+        **side_by_side(bodies),
         interfaces=tuple(interfaces),
-        units=bodies[0].units,
-        surface=np.concatenate([body.surface + n for body, n in zip(bodies, first_node, strict=False)]),
-        element_model=None
-        if any(model is None for model in models)
-        else WeldedModel(
-            tuple(model for model in models if model is not None),
-            n_mesh_dof,
-            tuple(len(body.nodes) for body in bodies),
-        ),
-        recovery=Recovery(
-            sp.csr_array(sp.block_diag([recovery.matrix for recovery in recoveries], format="csr")),
-            _numbered([recovery.dofs for recovery in recoveries], first_node),
-        ),
         load_cases=tuple(load_cases),
         ties=tuple(_ties(bodies, joined, n_dof, start)),
         mean_nodes=tuple(
@@ -265,12 +247,35 @@ def _side_by_side(
             for body, node, row in zip(bodies, first_node, np.cumsum([0, *n_mesh_dof]).tolist(), strict=False)
             for each in body.mean_nodes
         ),
-        stress_points=points_side_by_side(bodies, n_mesh_dof),
         numbering=numbering_side_by_side([body.numbered for body in bodies]),
         kept=np.concatenate([body.kept + n for body, n in zip(bodies, first_node, strict=False)]),
         node_volumes=None if any(v is None for v in volumes) else np.concatenate([v for v in volumes if v is not None]),
         provenance={f"{body.name}: {key}": value for body in bodies for key, value in body.provenance.items()},
     )
+
+
+def side_by_side(bodies: Sequence[FEBody]) -> dict[str, Any]:
+    """Return matrices, nodes, dofs, surface, models and recovery of a body made of others, as fields of `FEBody`."""
+    first_node = np.cumsum([0, *(len(body.nodes) for body in bodies)])
+    recoveries = [body.to_mesh for body in bodies]
+    n_mesh_dof = tuple(len(recovery.dofs) for recovery in recoveries)
+    models = tuple(body.element_model for body in bodies if body.element_model is not None)
+    n_nodes = tuple(len(body.nodes) for body in bodies)
+    return {
+        "M": sp.block_diag([body.M for body in bodies], format="csc"),
+        "K": sp.block_diag([body.K for body in bodies], format="csc"),
+        "D": block_damping(bodies),
+        "nodes": np.concatenate([body.nodes for body in bodies]),
+        "dofs": _numbered([body.dofs for body in bodies], first_node),
+        "units": bodies[0].units,
+        "surface": np.concatenate([body.surface + n for body, n in zip(bodies, first_node, strict=False)]),
+        "element_model": WeldedModel(models, n_mesh_dof, n_nodes) if len(models) == len(bodies) else None,
+        "recovery": Recovery(
+            sp.csr_array(sp.block_diag([recovery.matrix for recovery in recoveries], format="csr")),
+            _numbered([recovery.dofs for recovery in recoveries], first_node),
+        ),
+        "stress_points": points_side_by_side(bodies, n_mesh_dof),
+    }
 
 
 def _moved(body: FEBody, interface: Interface, is_ambiguous: bool, first_dof: int, first_node: int) -> Interface:
