@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 import floatframe as ff
 from floatframe.integrators.registry import CLASSES
 from floatframe.model.functions.time_functions import harmonic
+from floatframe.model.joints import JOINTS
 from floatframe.model.joints.joint import Column
 from tests.floatframe.engine.tree.mechanisms import beam
 from tests.root import ROOT
@@ -361,6 +362,68 @@ def test_generated_code_and_linear_forms_of_the_joint_are_its_recursions(tmp_pat
     assert_allclose(form.torques(samples)[0] @ form.values, force, rtol=0, atol=1e-12 * np.abs(force).max())
     unit = ff.design.generate_fmu(system, tmp_path / "pin.fmu")
     assert "pin.distance.value" in {each.name for each in unit.variables}
+
+
+# system files ---------------------------------------------------------------------------------------------------------
+
+SYSTEM = """
+[system]
+units = "m-kg-s"
+gravity = [0, -9.81, 0]
+
+[bodies.rod]
+mass = 2.0
+inertia = [[0.1, 0, 0], [0, 0.2, 0], [0, 0, 0.25]]
+position = [0.6, 0, 0]
+
+[joints.pin]
+type = "slots.pin-in-slot"
+body_a = "ground"
+marker_a = [0.1, 0, 0]
+body_b = "rod"
+marker_b = [-0.5, 0, 0]
+axis = [0, 0, 1]
+slot = [1, 0, 0]
+
+[joints.pin.motions.angle]
+type = "constant"
+value = 0.25
+
+[elements.cord]
+type = "slots_and_cords.cord"
+marker_a = {body = "rod", marker = [0.5, 0, 0]}
+marker_b = {body = "ground", marker = [1.9, -0.4, 0.3]}
+length = 0.5
+stiffness = 20
+stiffening = 300
+"""
+
+
+def test_a_system_file_gives_them_the_keys_of_their_fields(tmp_path, monkeypatch):
+    monkeypatch.setitem(JOINTS, "slots.pin-in-slot", KINDS.joint)
+    (tmp_path / "slot.toml").write_text(SYSTEM)
+    system, _ = ff.read_system(tmp_path / "slot.toml")
+    (pin,), (force,) = system.joints, system.elements
+    assert type(pin) is KINDS.joint
+    assert_allclose([pin.marker_a.position, pin.marker_b.position], [(0.1, 0, 0), (-0.5, 0, 0)], rtol=0, atol=0)
+    assert_allclose([pin.axis, pin.slot], [(0, 0, 1), (1, 0, 0)], rtol=0, atol=0)
+    assert pin.motions["angle"](0.3) == 0.25
+    assert (type(force), force.length, force.stiffness, force.stiffening) == (KINDS.force, 0.5, 20.0, 300.0)
+
+
+@pytest.mark.parametrize(("old", "new", "words"), [
+    ("slots.pin-in-slot", "slots.pin-in-slt", r"unknown type of joint; did you mean 'slots.pin-in-slot.* \(line 12\)"),
+    ("slot = [1, 0, 0]", "slto = [1, 0, 0]", "pin.slto: unknown key of type .slots.pin-in-slot.; did you mean 'slot'"),
+    ("slot = [1, 0, 0]\n", "", r"pin.slot: missing; expected a list of numbers \(line 11\)"),
+    ("motions.angle", "motions.angel", r"pin.motions: no coordinate 'angel'; choices: distance, angle \(line 11\)"),
+    ("stiffness = 20", 'stiffness = "20"', r"cord.stiffness = .20.: expected a number: k \(line 29\)"),
+    ("length = 0.5", "lenght = 0.5", "cord.lenght: unknown key; did you mean 'length'"),
+])  # fmt: skip
+def test_mistakes_in_a_system_file_are_told_with_key_and_line(tmp_path, monkeypatch, old, new, words):
+    monkeypatch.setitem(JOINTS, "slots.pin-in-slot", KINDS.joint)
+    (tmp_path / "slot.toml").write_text(SYSTEM.replace(old, new, 1))
+    with pytest.raises(ff.errors.SystemFileError, match=words):
+        ff.read_system(tmp_path / "slot.toml")
 
 
 # refusals -------------------------------------------------------------------------------------------------------------
