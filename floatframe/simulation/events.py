@@ -8,7 +8,7 @@ Event("crossing", "place", column="x", record=True)
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 
@@ -99,7 +99,7 @@ class Event:
     name: str
     watch: str = ""
     level: float = 0.0
-    direction: str = "both"
+    direction: Literal["rising", "falling", "both"] = "both"
     column: str = ""
     stop: bool = False
     switch_on: tuple[str, ...] = ()
@@ -124,11 +124,6 @@ class Event:
         object.__setattr__(self, "tolerance", number(f"{where}: tolerance", self.tolerance, above=0.0))
         for name in ("switch_on", "switch_off"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
-        if self.direction not in DIRECTIONS:
-            hint = nearest(self.direction, list(DIRECTIONS))
-            raise ModelError(
-                f"{where}: direction: expected one of {', '.join(DIRECTIONS)}, got {self.direction!r}{hint}"
-            )
         if bool(self.watch) == (self.at is not None):
             given = "both" if self.watch else "neither"
             raise ModelError(

@@ -2,14 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 from fe_models.foundation.records import FrozenMapping, checked_fields, frozen_copies
 from floatframe.errors import ModelError
 from floatframe.model.checked_values import number
 
-__all__ = ["SCHEMES", "Coupling", "ForeignUnit"]
-
-SCHEMES = ("explicit", "iterated")
+__all__ = ["Coupling", "ForeignUnit"]
 
 
 @frozen_copies
@@ -67,15 +66,13 @@ class Coupling:
     """
 
     step: float | None = None
-    scheme: str = "explicit"
+    scheme: Literal["explicit", "iterated"] = "explicit"
     tolerance: float = 1e-9
     max_iterations: int = 50
 
     def __post_init__(self) -> None:
         if self.step is not None:
             number("Coupling: step", self.step, above=0.0)
-        if self.scheme not in SCHEMES:
-            raise ModelError(f"Coupling: scheme: expected one of {', '.join(SCHEMES)}, got {self.scheme!r}")
         if not 0.0 < self.tolerance < 1.0:
             raise ModelError(f"Coupling: tolerance: expected 0 < tolerance < 1, got {self.tolerance}")
         if self.max_iterations < 2:

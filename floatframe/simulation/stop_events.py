@@ -49,13 +49,19 @@ def stop_events(system: System) -> tuple[StopEvent, ...]:
     for coupler in system.couplers:
         if coupler.limits is None:
             continue
-        for side, direction in (("lower", "falling"), ("upper", "rising")):
+        for side in ("lower", "upper"):
             level = getattr(coupler.limits, side)
             if level is not None:
                 name = f"{coupler.name} {side}"
-                events.append(
-                    StopEvent(name, coupler.name, level, direction=direction, coupler=coupler.name, side=side)
+                event = StopEvent(
+                    name,
+                    coupler.name,
+                    level,
+                    "falling" if side == "lower" else "rising",
+                    coupler=coupler.name,
+                    side=side,
                 )
+                events.append(event)
         name = f"{coupler.name} release"
         events.append(StopEvent(name, coupler.name, 0.0, direction="falling", coupler=coupler.name, side="release"))
     return tuple(events)

@@ -16,15 +16,15 @@ from floatframe.analyses.linear.force_inputs import ForceInput
 from floatframe.analyses.linear.inputs import BaseMotion, DriveMotion, ParameterInput
 from floatframe.errors import ModelError
 from floatframe.files.system_file.coordinate_section import of_joint
-from floatframe.files.system_file.described import DescribedSection, OneOf
-from floatframe.files.system_file.keys import Name, Number, Positive
+from floatframe.files.system_file.described import AcceptedTable, DescribedSection, ObjectOf, OneOf
+from floatframe.files.system_file.keys import Name, Number
 from floatframe.files.system_file.place_key import MeasuredPlace, marker_of
 from floatframe.results.sensors import SENSORS, Sensor
 from floatframe.results.sensors.channels import QUANTITIES, RATES, Channel, StressChannel
 from floatframe.results.sensors.joint_coordinate import JointCoordinate
 from floatframe.results.sensors.measurement import owner_and_column
-from floatframe.simulation.events import DIRECTIONS, Event
-from floatframe.simulation.foreign_units import SCHEMES, Coupling, ForeignUnit
+from floatframe.simulation.events import Event
+from floatframe.simulation.foreign_units import Coupling, ForeignUnit
 
 __all__ = [
     "CosimulationSection",
@@ -41,7 +41,7 @@ __all__ = [
 
 
 #: [sensors.NAME]: a quantity measured on a motion
-SensorSection = Annotated[DescribedSection, OneOf("sensor", SENSORS, "sensors.NAME", is_measured=True)]
+SensorSection = Annotated[DescribedSection, OneOf(SENSORS, "sensors.NAME", "sensor", is_measured=True)]
 
 
 # channel section ------------------------------------------------------------------------------------------------------
@@ -50,27 +50,8 @@ SensorSection = Annotated[DescribedSection, OneOf("sensor", SENSORS, "sensors.NA
 # tables of the system file for events: [events.NAME] ------------------------------------------------------------------
 
 
-class EventSection(Table):
-    """[events.NAME]: an action of a run when a measured value crosses a level, or at a given time."""
-
-    watch: str = Field("", description='the name of a sensor, or "joint.coordinate"')
-    at: float | None = Field(None, description="instead of watch, a number, the time of the event")
-    column: str = Field("", description="a column of the sensor; default: its first")
-    level: float = Field(0.0, description="a number, the value that is crossed")
-    direction: choice("direction", lambda: tuple(DIRECTIONS)) = Field(  # type: ignore[valid-type]
-        "both", description=f"one of {', '.join(DIRECTIONS)}"
-    )
-    stop: bool = Field(False, description="true: the run ends there")
-    switch_on: list[str] = Field([], description="names of forces and couplers")
-    switch_off: list[str] = Field([], description="names of forces and couplers")
-    record: bool = Field(False, description="true: the results at this time are kept")
-    tolerance: Annotated[float, Field(gt=0)] = Field(
-        1e-9, description="a number above 0, the tolerance of the time, relative to the step"
-    )
-
-    def event(self, name: str) -> Event:
-        """Return the event of that name."""
-        return Event(name, **{key: getattr(self, key) for key in type(self).model_fields})
+#: [events.NAME]: an action of a run when a measured value crosses a level, or at a given time
+EventSection = Annotated[AcceptedTable, ObjectOf(Event, "events.NAME")]
 
 
 # tables of the system file for co-simulation: [fmu], [fmus.NAME] and [cosimulation] -----------------------------------
@@ -101,19 +82,8 @@ class ForeignSection(Table):
         return ForeignUnit(name, str(folder / self.file), self.inputs, self.outputs, self.parameters)
 
 
-class CosimulationSection(Table):
-    """[cosimulation]: how the system and its FMUs are stepped together."""
-
-    step: Positive | None = Field(None, description="a number above 0, the macro-step, a multiple of run.h")
-    scheme: choice("scheme", lambda: SCHEMES) = Field(  # type: ignore[valid-type]
-        SCHEMES[0], description=f"one of {', '.join(SCHEMES)}"
-    )
-    tolerance: float = Field(1e-9, gt=0, lt=1, description="a number between 0 and 1, the tolerance of the iteration")
-    max_iterations: int = Field(50, ge=2, description="a whole number, 2 or more, the most rounds of the iteration")
-
-    def coupling(self) -> Coupling:
-        """Return the coupling that the table describes."""
-        return Coupling(self.step, self.scheme, self.tolerance, self.max_iterations)
+#: [cosimulation]: how the system and its FMUs are stepped together
+CosimulationSection = Annotated[AcceptedTable, ObjectOf(Coupling, "cosimulation")]
 
 
 # channel section ------------------------------------------------------------------------------------------------------

@@ -32,7 +32,7 @@ ELSEWHERE = {
 
 #: [joints.NAME]: a joint between two bodies; a file states the directions and lengths of a joint
 JointSection = Annotated[
-    DescribedSection, OneOf("joint", JOINTS, "joints.NAME", ELSEWHERE, stated=(np.ndarray, Quantity))
+    DescribedSection, OneOf(JOINTS, "joints.NAME", "joint", ELSEWHERE, stated=(np.ndarray, Quantity))
 ]
 
 
@@ -93,7 +93,7 @@ def coupler_of(name: str, section: CouplerSection, signals: Signals = None) -> C
 
 
 #: [forces.NAME]: a force element
-ForceSection = Annotated[DescribedSection, OneOf("force", FORCES, "forces.NAME")]
+ForceSection = Annotated[DescribedSection, OneOf(FORCES, "forces.NAME", "force")]
 
 
 def force_of(name: str, section: DescribedSection, signals: Signals = None) -> Force:

@@ -81,37 +81,12 @@ class FieldsTable(Table):
         return {key: python_value(value, signals) for key, value in given.items() if key != "type" or not self.is_typed}
 
 
-class MarkerSection(Table):
-    """A table that describes a marker."""
+class AcceptedTable(FieldsTable):
+    """A table whose object is made when it is checked, so that messages of the class name key and value."""
 
-    body: Name = pydantic.Field(description='the name of a body, or "ground"')
-    marker: PlaceOnBody | None = pydantic.Field(None, description="an interface, or a position [x, y, z] in the body")
-    triad: Matrix3 | None = pydantic.Field(None, description="the axes of the marker, [x axis, y axis, z axis]")
-
-
-class DescribedSection(FieldsTable):
-    """A table that describes an object; a marker has keys for its body, its place and its axes."""
-
-    is_measured: ClassVar[bool]  #: whether its places may be nodes, elements and sets of a mesh
-    is_typed = True
-    type: Any
-
-    def object_named(self, name: str, signals: Signals = None) -> Any:
+    def object_named(self, name: str = "", signals: Signals = None) -> Any:
         """Return the object of the table."""
-        given: dict[str, Any] = {}
-        for each in own_fields(self.described):
-            hint = hints_of(self.described)[each.name]
-            if is_marker(each.name, hint):
-                keys = marker_keys(each.name, is_measured=self.is_measured)
-                values = {role: getattr(self, key) for role, key in keys.items()}
-                if values["body"] is not None:
-                    is_body = str in get_args(hint) and all(values[role] is None for role in ("place", "triad"))
-                    given[each.name] = values["body"] if is_body else marker_of(**values)
-            elif is_named(hint, self.type):
-                given[each.name] = self.type
-            elif each.name in self.model_fields_set:
-                given[each.name] = python_value(getattr(self, each.name), signals)
-        return self.described(name=name, **given)
+        return self.object_with(signals, **({"name": name} if "name" in hints_of(self.described) else {}))
 
     def require_accepted(self) -> None:
         """Raise the error of the class if it does not accept the values."""
@@ -127,7 +102,7 @@ class DescribedSection(FieldsTable):
             return section
         except ModelError as error:
             # of a message such as "joint '': axis: expected ..." or "wheel: radius: expected ..."
-            text = re.sub(rf"^(\w+ ''|shape|{re.escape(str(table.get('type')))}): ", "", str(error))
+            text = re.sub(rf"^(\w+ ''|shape|{cls.__name__}|{re.escape(str(table.get('type')))}): ", "", str(error))
             key, _, reason = text.partition(": ")
             if key not in cls.model_fields or key not in table:
                 raise ValueError(text) from None
@@ -135,6 +110,39 @@ class DescribedSection(FieldsTable):
             details = InitErrorDetails(type=problem, loc=(key,), input=table.get(key))
             raise ValidationError.from_exception_data(key, [details]) from None
         return section
+
+
+class MarkerSection(Table):
+    """A table that describes a marker."""
+
+    body: Name = pydantic.Field(description='the name of a body, or "ground"')
+    marker: PlaceOnBody | None = pydantic.Field(None, description="an interface, or a position [x, y, z] in the body")
+    triad: Matrix3 | None = pydantic.Field(None, description="the axes of the marker, [x axis, y axis, z axis]")
+
+
+class DescribedSection(AcceptedTable):
+    """A table that describes an object; a marker has keys for its body, its place and its axes."""
+
+    is_measured: ClassVar[bool]  #: whether its places may be nodes, elements and sets of a mesh
+    is_typed = True
+    type: Any
+
+    def object_named(self, name: str = "", signals: Signals = None) -> Any:
+        """Return the object of the table."""
+        given: dict[str, Any] = {}
+        for each in own_fields(self.described):
+            hint = hints_of(self.described)[each.name]
+            if is_marker(each.name, hint):
+                keys = marker_keys(each.name, is_measured=self.is_measured)
+                values = {role: getattr(self, key) for role, key in keys.items()}
+                if values["body"] is not None:
+                    is_body = str in get_args(hint) and all(values[role] is None for role in ("place", "triad"))
+                    given[each.name] = values["body"] if is_body else marker_of(**values)
+            elif is_named(hint, self.type):
+                given[each.name] = self.type
+            elif each.name in self.model_fields_set:
+                given[each.name] = python_value(getattr(self, each.name), signals)
+        return self.described(name=name, **given)
 
 
 def python_value(value: Any, signals: Signals) -> Any:
@@ -279,11 +287,15 @@ Model = TypeVar("Model", bound=FieldsTable)
 
 
 def model_of_keys(kind: Any, place: str, name: str, base: type[Model], keys: Mapping[str, Any]) -> type[Model]:
-    """Return the model of the tables at a place that describe an object of a class and have these keys and `type`."""
-    typed: dict[str, Any] = {"type": (Literal[name], pydantic.Field(description=f'"{name}"')), **keys}
+    """Return the model of the tables at a place that describe an object of a class and have these keys.
+
+    With a name, they also have the key `type` of this value.
+    """
+    typed: dict[str, Any] = {"type": (Literal[name], pydantic.Field(description=f'"{name}"'))} if name else {}
     summary = (inspect.getdoc(kind) or "").partition("\n\n")[0]
-    text = f'{place} of type "{name}": {summary}'
-    model = create_model(kind.__name__, __base__=base, __doc__=text, __cls_kwargs__={"title": name}, **typed)
+    text = f'{place} of type "{name}": {summary}' if name else f"{place}: {summary}"
+    title = {"title": name} if name else {}
+    model = create_model(kind.__name__, __base__=base, __doc__=text, __cls_kwargs__=title, **typed, **keys)
     model.described = kind
     return model
 
@@ -408,44 +420,23 @@ class AnyTable(Table):
 
 
 @dataclass(frozen=True, eq=False)
-class OneOf:
-    """Annotation of a table that describes an object of one of several classes, which its key `type` names.
+class ObjectOf:
+    """Annotation of a table that describes an object of a class.
 
     Parameters
     ----------
-    what
-        What the objects are, such as "joint".
-    kinds
-        Classes by the values of `type`.
+    kind
+        The class, a dataclass.
     place
         Key path of the tables.
-    elsewhere
-        Values of `type` by their names in other programs.
-    stated
-        Fields whose default has one of these types must be stated in a file.
-    is_measured
-        Whether places may be nodes, elements and sets of a mesh.
     """
 
-    what: str
-    kinds: Mapping[str, Any]
+    kind: Any
     place: str
-    elsewhere: Mapping[str, str] = field(default_factory=dict)
-    stated: tuple[type, ...] = ()
-    is_measured: bool = False
 
     def model_of(self, value: Any) -> type[Table]:
-        """Return the model of a table; if its type is missing or unknown, a model that says so."""
-        kind = value.get("type") if isinstance(value, dict) else None
-        if isinstance(kind, str) and kind in self.kinds:
-            return self.section(kind)
-        typed = choice(f"type of {self.what}", lambda: tuple(self.kinds), self.elsewhere)
-        field = pydantic.Field(description=f"one of {', '.join(self.kinds)}")
-        return create_model(self.what, __base__=AnyTable, type=(typed, field))
-
-    def section(self, kind: str) -> type[DescribedSection]:
-        """Return the model of the tables of a type."""
-        return section_of(kind, self.kinds[kind], self.place, self.stated, self.is_measured)
+        """Return the model of a table."""
+        return plain_section_of(self.kind, self.place)
 
     def validated(self, value: Any, info: ValidationInfo) -> Table:
         """Return the validated table."""
@@ -456,11 +447,60 @@ class OneOf:
         return core_schema.with_info_plain_validator_function(self.validated)
 
     def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> dict[str, Any]:
+        """Return the schema of a table."""
+        return definition(self.place, self.model_of({}), handler)
+
+
+@cache
+def plain_section_of(kind: Any, place: str) -> type[AcceptedTable]:
+    """Return the model of the tables at a place that describe an object of a class and have no `type`."""
+    return model_of_keys(kind, f"[{place}]", "", AcceptedTable, keys_of_fields(kind, ("name",)))
+
+
+@dataclass(frozen=True, eq=False)
+class OneOf(ObjectOf):
+    """Annotation of a table that describes an object of one of several classes, which its key `type` names.
+
+    Parameters
+    ----------
+    kind
+        Classes by the values of `type`.
+    place
+        Key path of the tables.
+    what
+        What the objects are, such as "joint".
+    elsewhere
+        Values of `type` by their names in other programs.
+    stated
+        Fields whose default has one of these types must be stated in a file.
+    is_measured
+        Whether places may be nodes, elements and sets of a mesh.
+    """
+
+    what: str = ""
+    elsewhere: Mapping[str, str] = field(default_factory=dict)
+    stated: tuple[type, ...] = ()
+    is_measured: bool = False
+
+    def model_of(self, value: Any) -> type[Table]:
+        """Return the model of a table; if its type is missing or unknown, a model that says so."""
+        kind = value.get("type") if isinstance(value, dict) else None
+        if isinstance(kind, str) and kind in self.kind:
+            return self.section(kind)
+        typed = choice(f"type of {self.what}", lambda: tuple(self.kind), self.elsewhere)
+        field = pydantic.Field(description=f"one of {', '.join(self.kind)}")
+        return create_model(self.what, __base__=AnyTable, type=(typed, field))
+
+    def section(self, kind: str) -> type[DescribedSection]:
+        """Return the model of the tables of a type."""
+        return section_of(kind, self.kind[kind], self.place, self.stated, self.is_measured)
+
+    def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> dict[str, Any]:
         """Return the schema of a table of any type; each type has a definition of its own."""
         schemas = []
-        for kind in self.kinds:
+        for name in self.kind:
             try:
-                schemas.append(definition(f"{self.what}.{kind}", self.section(kind), handler))
+                schemas.append(definition(f"{self.what}.{name}", self.section(name), handler))
             except ModelError as error:  # of another package, which cannot be loaded
                 log.warning("%s", error)
         return {"anyOf": schemas}

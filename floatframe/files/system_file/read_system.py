@@ -218,7 +218,7 @@ def read_system(
             inputs=[section.channel(key) for key, section in data.inputs.items()],
             outputs=[section.output(key, sensors) for key, section in data.outputs.items()],
             controllers=[section.controller(key, path.parent) for key, section in data.controllers.items()],
-            events=[section.event(key) for key, section in data.events.items()],
+            events=[section.object_named(key) for key, section in data.events.items()],
             fmus=[section.unit(key, path.parent) for key, section in data.fmus.items()],
             scene=[section.object_named() for section in data.scene],
             source=str(path.resolve()),
@@ -240,5 +240,5 @@ def read_system(
         raise SystemFileError(f"{path}: {error}{line}") from error
     if data.run is None:
         return system, None
-    coupling = None if data.cosimulation is None else data.cosimulation.coupling()
+    coupling = None if data.cosimulation is None else data.cosimulation.object_named()
     return system, replace(data.run.options(), coupling=coupling)

@@ -57,4 +57,4 @@ def drawn_section_of(kind: str) -> type[DrawnSection]:
     return model_of_keys(GEOMETRIES[kind], "[[bodies.NAME.shapes]] or [[scene]]", kind, DrawnSection, {**own, **PLACE})
 
 
-ShapeSection = Annotated[DrawnSection, OneShape("shape", GEOMETRIES, "scene")]
+ShapeSection = Annotated[DrawnSection, OneShape(GEOMETRIES, "scene", "shape")]

@@ -378,7 +378,7 @@ def test_file_holds_events_at_times_and_events_that_record(write):
     text = '[events.go]\nat = 0.25\nswitch_on = ["spring"]\n[events.low]\nwatch = "pin.angle"\nrecord = true\n\n[run]'
     system, _ = read_system(write(("[run]", text)))
     assert system.events == (Event("go", at=0.25, switch_on=("spring",)), Event("low", "pin.angle", record=True))
-    with pytest.raises(SystemFileError, match=r"event 'go': expected either watch .* got both"):
+    with pytest.raises(SystemFileError, match=r"events.go: expected either watch .* got both \(line 44\)"):
         read_system(write(("[run]", text.replace("at = 0.25", 'at = 0.25\nwatch = "pin.angle"'))))
 
 
