@@ -363,21 +363,35 @@ def items_of(value: Any) -> Any:
 
 def either(keys: Sequence[Key]) -> Key:
     """Return the key of a value that has one of several types."""
-    adapters = [TypeAdapter(key.type) for key in keys]
+    return Key(Annotated[Any, Either(tuple(keys))], " or ".join(key.meaning for key in keys))
 
-    def check(value: Any, info: ValidationInfo) -> Any:
+
+@dataclass(frozen=True)
+class Either:
+    """Annotation of a value that has one of several types."""
+
+    keys: tuple[Key, ...]
+
+    def model_of(self, value: Any) -> Any:
+        """Return the type of a table that the value may be."""
+        return next((key.type for key in self.keys if isinstance(key.type, type) and issubclass(key.type, Table)), None)
+
+    def validated(self, value: Any, info: ValidationInfo) -> Any:
+        """Return the value as the first type that takes it; else the problem is that of the type that fits best."""
         problems = []
-        for adapter in adapters:
+        for key in self.keys:
             try:
-                return adapter.validate_python(value, strict=True, context=info.context)
+                return TypeAdapter(key.type).validate_python(value, strict=True, context=info.context)
             except ValidationError as problem:
                 problems.append(problem)
-        raise max(problems, key=lambda problem: len(problem.errors()[0]["loc"]))  # that of the kind that fits best
+        raise max(problems, key=lambda problem: len(problem.errors()[0]["loc"]))
 
-    types: Any = Union.__getitem__(tuple(key.type for key in keys))
-    return Key(
-        Annotated[Any, PlainValidator(check, json_schema_input_type=types)], " or ".join(k.meaning for k in keys)
-    )
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        """Return how a value is validated."""
+        types: Any = Union.__getitem__(tuple(key.type for key in self.keys))
+        return core_schema.with_info_plain_validator_function(
+            self.validated, json_schema_input_schema=handler.generate_schema(types)
+        )
 
 
 def numbers_of_any_shape(value: Any) -> Any:

@@ -340,6 +340,11 @@ def test_a_table_whose_spline_overshoots_is_noted_unless_its_interpolation_is_ch
         ('joint = "pin"', 'joint = "pni"', r"force 'motor': no joint 'pni'; did you mean 'pin'.* \(line 45\)"),
         ('coordinate = "angle"', 'coordinate = "distance"', "no coordinate 'distance' that can take a force"),
         ("friction = 0.1", "friction = -1", "friction = -1: expected a number >= 0"),
+        (
+            "t_start = 0",
+            "t_strat = 0",
+            r"forces.motor.motor.t_strat: unknown key; did you mean 't_start'.* \(line 54\)",
+        ),
         ("damping = 0.2", "force = [1, 0, 0]", 'motor.force: unknown key of type "joint-force"; did you mean .free.'),
     ],
 )
