@@ -59,18 +59,18 @@ class Bolt(ScrewJoint):
 
     Parameters
     ----------
-    pitch
-        Distance of neighbouring threads [m].
+    thread
+        Name of the thread.
     starts
         Number of threads.
     """
 
-    pitch: float = 0.0
+    thread: str = "M250"
     starts: int = 1
     lead: float = 0.0
 
     def __post_init__(self):
-        object.__setattr__(self, "lead", self.pitch * self.starts)
+        object.__setattr__(self, "lead", {"M250": 0.25}[self.thread] * self.starts)
         super().__post_init__()
 
 
@@ -146,7 +146,7 @@ body_a = "ground"
 body_b = "block"
 marker_b = [0, 0, 0]
 axis = [0, 0, 1]
-pitch = 0.25
+thread = "M250"
 starts = 2
 [elements.up]
 type = "acme.push"
@@ -182,6 +182,7 @@ for call, error in (
     (lambda: element_class("acme.broken"), ff.errors.ModelError),
     (lambda: element_class("acme.number"), ff.errors.ModelError),
     (lambda: changed("starts = 2", "start = 2"), ff.errors.SystemFileError),
+    (lambda: changed("M250", "M260"), ff.errors.SystemFileError),
     (lambda: changed("acme.bolt", "acme.blt"), ff.errors.SystemFileError),
     (lambda: changed("acme.bolt", "acme.broken"), ff.errors.SystemFileError),
     (lambda: changed("acme.height", "acme.number"), ff.errors.SystemFileError),
@@ -211,13 +212,14 @@ def test_a_package_adds_a_mode_set_an_element_a_joint_a_sensor_and_a_reader(fold
     done = subprocess.run([sys.executable, "-c", USE], cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     *own, last = done.stdout.splitlines()
-    modes, element, number, key, kind, joint, sensor = own
+    modes, element, number, key, code, kind, joint, sensor = own
     assert "cms.mode_sets 'broken' of package acme-fe 1.2: " in modes
     assert "ModuleNotFoundError: No module named 'acme_fe.nowhere'" in modes
     assert "floatframe.elements 'acme.broken' of package acme-fe 1.2: " in element
     assert "floatframe.elements 'acme.number' of package acme-fe 1.2: " in number
     assert "expected a class that derives from Element" in number
     assert "joints.bolt.start: unknown key of type \"acme.bolt\"; did you mean 'starts'?" in key
+    assert "joints.bolt: Bolt: KeyError: 'M260' (line " in code
     assert "unknown type of joint; did you mean 'acme.bolt'?" in kind
     assert "joints.bolt: floatframe.joints 'acme.broken' of package acme-fe 1.2: " in joint
     assert "sensors.height: floatframe.sensors 'acme.number' of package acme-fe 1.2: " in sensor

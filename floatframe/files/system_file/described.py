@@ -109,6 +109,8 @@ class AcceptedTable(FieldsTable):
             problem = PydanticCustomError("value_error", "{error}", {"error": reason})
             details = InitErrorDetails(type=problem, loc=(key,), input=table.get(key))
             raise ValidationError.from_exception_data(key, [details]) from None
+        except (ArithmeticError, AttributeError, LookupError, TypeError) as error:  # of a class of another package
+            raise ValueError(f"{cls.described.__name__}: {type(error).__name__}: {error}") from error
         return section
 
 
