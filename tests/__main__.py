@@ -14,9 +14,9 @@ as a whole when its check ends; the first stage in which one fails ends the run.
 the tests, so that no core waits for the end of another check. The last line says how long the group took, and what it
 may take on a machine with two cores.
 
-Tests and notebooks are spread over workers, a processor each (file by file, so that fixtures of a module are made
-once). A worker leaves the other processors to the other workers: the libraries in it have one thread, whatever the
-machine, unless OMP_NUM_THREADS says otherwise. Results may not depend on either number.
+Tests are spread over workers, a processor each (file by file, so that fixtures of a module are made once). A worker
+leaves the other processors to the other workers: the libraries in it have one thread, whatever the machine, unless
+OMP_NUM_THREADS says otherwise. Results may not depend on either number.
 """
 
 import difflib
@@ -53,10 +53,9 @@ PLAIN_MOTIONS = (
     "motions by plain numba", "pytest", "-q", "-o", "timeout=3600", "-m", "not long", "tests/floatframe/engine/kernels",
     "--ignore=tests/floatframe/engine/kernels/compiler", "tests/floatframe/integrators/test_pendulum.py",
 )  # fmt: skip
-#: notebooks among the tests, so that no worker is idle at the end of either
 TESTS = (
-    "tests and notebooks", "pytest", "-q", *SPREAD, "--no-loadscope-reorder", "-p", "tests.slowest",
-    "-m", "not long and not external", "--nbmake", "--nbmake-timeout=300", "notebooks", "tests",
+    "tests", "pytest", "-q", *SPREAD, "--no-loadscope-reorder", "-p", "tests.slowest",
+    "-m", "not long and not external", "tests",
 )  # fmt: skip
 LONG = ("long tests", "pytest", "-q", "--durations=0", "-m", "long and not external", "tests")
 RELATIVE = (

@@ -36,4 +36,4 @@ def pytest_collection_modifyitems(items):
     """Sort whole files: the slowest first, then the notebooks, then the others as they were."""
     ranks = {ROOT / file: rank for rank, file in enumerate(SLOWEST)}
     notebook, other = len(ranks), len(ranks) + 1
-    items.sort(key=lambda item: ranks.get(item.path, notebook if item.path.suffix == ".ipynb" else other))
+    items.sort(key=lambda item: ranks.get(item.path, notebook if item.path.parent.name == "notebooks" else other))

@@ -126,10 +126,10 @@ def test_the_slowest_files_and_the_notebooks_start_first():
     quick, slow = "tests/test_errors.py", "tests/pipeline/test_line.py"
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "tests.slowest", "--collect-only",
-         "--nbmake", quick, "notebooks/kart.ipynb", slow], cwd=ROOT, capture_output=True, text=True, check=False,
+         quick, "tests/notebooks/test_kart.py", slow], cwd=ROOT, capture_output=True, text=True, check=False,
     )  # fmt: skip
     files = list(dict.fromkeys(line.partition("::")[0] for line in done.stdout.splitlines() if "::" in line))
-    assert files == [slow, "notebooks/kart.ipynb", quick], done.stdout
+    assert files == [slow, "tests/notebooks/test_kart.py", quick], done.stdout
 
 
 def test_processes_of_a_check_store_the_byte_code_of_modules(monkeypatch):

@@ -398,7 +398,8 @@ def notebook(path: Path) -> None:
             cell.outputs = [output for output in cell.outputs if output.get("name") != "stderr"]
             for output in cell.outputs:
                 if "text" in output:
-                    output.text = re.sub(rf"{re.escape(tempfile.gettempdir())}/\w+/", "", output.text)
+                    for place in (rf"{re.escape(tempfile.gettempdir())}/\w+/", re.escape(f"{path.parent.parent}/")):
+                        output.text = re.sub(place, "", output.text)
                 data = output.get("data", {})
                 if "image/png" in data:
                     picture = Image.open(io.BytesIO(base64.b64decode(data["image/png"])))

@@ -1,0 +1,7 @@
+"""The notebook railway_stability runs, and its claims hold."""
+
+from tests.notebooks.running import run
+
+
+def test_the_notebook_runs():
+    run("railway_stability")
