@@ -17,6 +17,7 @@ from cms.linear_algebra.solvers.registry import solver_of
 from fe_models.foundation.digest import file_digest
 from fe_models.foundation.parametric_file import extended_files
 from fe_models.foundation.paths import file_identity, remove_parts
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.tasks.campaign import Campaign, open_task_journal
 from fe_models.foundation.tasks.installation import source_mark
 from fe_models.foundation.tasks.workers import Workers
@@ -38,6 +39,7 @@ class FleetJob:
     solver: str | None = None  #: solver that replaces the solver of the job; None: that of the job
 
 
+@presented
 @dataclass(frozen=True)
 class FleetRow:
     """Result of one job of a fleet."""

@@ -2,6 +2,7 @@
 
 import dataclasses
 import inspect
+import typing
 from html.parser import HTMLParser
 
 import numpy as np
@@ -10,6 +11,7 @@ import scipy.sparse as sp
 
 import cms
 import floatframe as ff
+from fe_models.foundation.documents.table import Table
 from fe_models.foundation.presentation import LONGEST_VALUE, MOST_ROWS, Summary, presented, text_of
 from tests.bodies import bar
 from tests.public_objects import public_objects
@@ -83,6 +85,64 @@ def test_public_objects_print_at_most_2000_characters_in_30_lines(objects):
     tall = {PUBLIC[type(each)]: repr(each).count("\n") for each in found if repr(each).count("\n") >= MOST_LINES}
     assert (long, tall) == ({}, {})
     assert len({type(each) for each in found}) > 20
+
+
+#: modules of arrays that the engine and the solvers hand to each other, and of single values
+INTERNAL = ("floatframe.engine.", "cms.linear_algebra.", "fe_models.foundation.", "floatframe.results.small_motions.")
+
+
+def returned_classes():
+    """Return the data classes that public functions return, and what their methods and properties return in turn."""
+    given = [each for package in ("fe_models", "cms", "floatframe") for each in public_objects(package).values()]
+    waiting = [one for each in given if inspect.isroutine(each) for one in classes_in(hint_of(inspect.unwrap(each)))]
+    found = set()
+    while waiting:
+        kind = waiting.pop()
+        if kind in found or not kind.__module__.startswith(("fe_models.", "cms.", "floatframe.")):
+            continue
+        found.add(kind)
+        for name in dir(kind):
+            part = inspect.getattr_static(kind, name, None)
+            method = getattr(part, "fget", None) or getattr(part, "func", None) or part
+            if not name.startswith("_") and inspect.isfunction(method):
+                waiting += classes_in(hint_of(method))
+    return {each for each in found if dataclasses.is_dataclass(each) and not each.__module__.startswith(INTERNAL)}
+
+
+def hint_of(function):
+    """Return the annotation of what a function returns; None if a name in it is only known to type checkers."""
+    try:
+        return typing.get_type_hints(function).get("return")
+    except NameError:
+        return None
+
+
+def classes_in(hint):
+    """Yield the classes in an annotation."""
+    if inspect.isclass(hint) and not typing.get_args(hint):
+        yield hint
+    for part in typing.get_args(hint):
+        yield from classes_in(part)
+
+
+def test_what_public_functions_return_shows_itself_in_notebooks():
+    """Inputs that are returned, such as a joint or a material, show themselves as they are written."""
+    inputs = {each for each in PUBLIC if not hasattr(each, "to_table")}
+    found = returned_classes() - inputs
+    assert len(found) > 40
+    assert sorted(f"{each.__module__}.{each.__name__}" for each in found if not hasattr(each, "_repr_html_")) == []
+
+
+def test_parts_of_a_motion_print_at_most_2000_characters(objects):
+    motion = objects[6]
+    joint, body = motion.joint("pin"), motion.body("rod")
+    parts = [joint, joint.reaction, joint.drift, joint.coordinate("angle"), body, motion.energies, motion.head]
+    tables = [motion.to_table(), Table({f"column of a long name {k}": np.arange(20.0) for k in range(100)})]
+    for each in [*parts, *tables]:
+        assert len(repr(each)) <= LONGEST, type(each)
+        assert repr(each).count("\n") < MOST_LINES, type(each)
+    assert "angle" in repr(joint)
+    assert "... and 96 more columns" in repr(tables[1])
 
 
 class Balanced(HTMLParser):

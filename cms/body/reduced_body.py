@@ -27,6 +27,7 @@ from fe_models.meshes.numbering import NONE, Numbering
 __all__ = ["BodyFrame", "ReducedBody", "ReducedInterface", "unit_findings"]
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)

@@ -20,6 +20,7 @@ from cms.exchange.programs.nastran import make_dmig, make_op4
 from cms.exchange.programs.sid_fem import make_sid_fem
 from cms.exchange.programs.vtk import make_vtk
 from fe_models.foundation.paths import is_stream, replace_files
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.seal import reason
 from fe_models.foundation.units import Units, unit_system
 from fe_models.foundation.words import nearest, quoted
@@ -119,6 +120,7 @@ NEEDS = {
 }  #: for each key of `Writer.needs`: test of the body, and text of the error
 
 
+@presented
 @dataclass(frozen=True)
 class Exported:
     """Written files, and the data that the format cannot hold."""

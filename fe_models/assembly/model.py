@@ -24,6 +24,7 @@ from fe_models.assembly.tables.places import InterfaceSection, LoadCaseSection
 from fe_models.assembly.tables.shells import ShellSection, check_layups
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.errors import ArgumentError, BodyError
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from fe_models.foundation.stages import Stages
 from fe_models.foundation.toml_file import Table, validated
@@ -61,6 +62,7 @@ class GivenElements(Protocol):
         """Return the body, with the interfaces and load cases of the model."""
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class FEModel:

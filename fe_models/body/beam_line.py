@@ -9,6 +9,7 @@ from numpy.polynomial import Polynomial
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ArgumentError, BodyError
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 
 __all__ = ["BeamLine", "Law"]
@@ -19,6 +20,7 @@ STIFFNESSES = ("EA", "EIy", "EIz", "GJ", "GAy", "GAz")
 SMOOTH_DEGREE = 24  #: polynomial degree assumed for the integration of a law that is a Python function
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class BeamLine:

@@ -234,6 +234,7 @@ class Interface:
             object.__setattr__(self, "dofs", frozen(self.dofs, np.int64))
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class Recovery:
     """Map from the dofs of a coupled body to its mesh dofs: u_mesh = matrix @ u."""

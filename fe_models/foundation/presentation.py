@@ -17,6 +17,7 @@ Class = TypeVar("Class", bound=type)
 
 LONGEST_VALUE = 70  #: largest number of characters of a value
 MOST_ROWS = 12  #: largest number of rows in the table of a summary
+WIDEST = 118  #: largest number of characters in a row of this table
 FEW = 6  #: largest number of names or list items in the output
 SMALL_ARRAY = 12  #: largest number of entries of an array whose numbers are in the output
 
@@ -34,7 +35,7 @@ class Summary:
     headings
         Headings of the table below the rows, if there is one.
     table
-        Rows of this table; the first `MOST_ROWS` are shown.
+        Rows of this table; the first `MOST_ROWS` are shown, and as text the columns that fit into `WIDEST` characters.
     """
 
     title: str
@@ -48,11 +49,16 @@ class Summary:
         lines = [self.title, *(f"  {label:<{width}}  {value}" for label, value in self.rows)]
         shown = [list(self.headings), *(list(row) for row in self.table[:MOST_ROWS])] if self.table else []
         widths = [max(len(row[k]) for row in shown) for k in range(len(self.headings))] if shown else []
+        ends = [sum(widths[: k + 1]) + 2 * (k + 1) for k in range(len(widths))]
+        n_fit = max(1, sum(end <= WIDEST for end in ends))
         lines += [
-            "  " + "  ".join(f"{cell:<{n}}" for cell, n in zip(row, widths, strict=True)).rstrip() for row in shown
+            "  " + "  ".join(f"{cell:<{n}}" for cell, n in zip(row[:n_fit], widths, strict=False)).rstrip()
+            for row in shown
         ]
         if len(self.table) > MOST_ROWS:
             lines.append(f"  ... and {len(self.table) - MOST_ROWS} more")
+        if n_fit < len(widths):
+            lines.append(f"  ... and {len(widths) - n_fit} more columns")
         return "\n".join(lines)
 
     def html(self) -> str:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from floatframe.engine.compiling.callbacks import raise_errors_of
 from floatframe.engine.compiling.callbacks.law_functions import called_law
@@ -33,6 +34,7 @@ ROUNDING = 1e-9  #: rounding error of values, relative to their magnitude
 AXES = "xyz"
 
 
+@presented
 @dataclass(frozen=True)
 @checked_fields(ModelError)
 class ElementCheck:

@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from floatframe.engine.compiling.file_frames import state_of_file
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.initial_conditions.initial import consistent_motion, counted_angles_of
@@ -41,6 +42,7 @@ __all__ = [
 LEAST_STEP = 1e-6  #: smallest size of a divided step relative to the largest, if the user gives no minimum
 
 
+@presented
 @dataclass(frozen=True)
 class Failure:
     """Reason why a step failed."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.words import nearest, quoted
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import ResultsError
@@ -16,6 +17,7 @@ from floatframe.results.trajectory import Trajectory
 __all__ = ["CouplerMotion", "UserForceMotion", "coupler_motion", "user_force_motion"]
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class CouplerMotion:
     """Coordinates of a coupler over time, in the order of its terms, and the forces along them."""
@@ -27,6 +29,7 @@ class CouplerMotion:
     force: Array
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class UserForceMotion:
     """Coordinates, forces and states of a user force over time, by name, each (n_t,)."""

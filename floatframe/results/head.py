@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.units import UNIT_SYSTEMS
 from fe_models.foundation.words import quoted
 from floatframe.engine.compiling.counted_angles import CountedAngle, direction
@@ -16,6 +17,7 @@ OPTIONAL = {"summary", "angles", "places", "loads", "load_cases"}
 NUMBERS_OF_RUN = ("t_start", "t_end", "h")
 
 
+@presented
 @dataclass(frozen=True)
 class BodyEntry:
     """The columns of a body in the arrays of a results file."""
@@ -29,6 +31,7 @@ class BodyEntry:
     is_stiffened: bool = False  #: whether its geometric stiffness is used
 
 
+@presented
 @dataclass(frozen=True)
 class Head:
     """The content of a results file besides arrays."""

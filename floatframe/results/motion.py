@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.documents.table import Table, Tabular
-from fe_models.foundation.presentation import presented
+from fe_models.foundation.presentation import Summary, presented
 from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError, ResultsError
@@ -161,6 +161,7 @@ class Motion(Tabular, Trajectory):
         return figure_of(ax)
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MovedBody(BodyMotion):
@@ -190,12 +191,21 @@ class MovedBody(BodyMotion):
         return nodal_stress(self.motion, self.name, self.reduced, i_time)
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class JointMotion:
     """A joint in a motion: `angle`, `angle_rate` and `angle_force` for a coordinate "angle", and so on, each (n_t,)."""
 
     motion: Motion
     name: str
+
+    def summary(self) -> Summary:
+        """Return the content shown by `repr` and notebooks: the range of each coordinate with its unit."""
+        table = []
+        for name in self.coordinates:
+            found = self.coordinate(name)
+            table.append((name, found.units["value"], f"{found.value.min():.6g}", f"{found.value.max():.6g}"))
+        return Summary(f"JointMotion {self.name!r}", [], ("coordinate", "unit", "least", "greatest"), table)
 
     @property
     def coordinates(self) -> tuple[str, ...]:

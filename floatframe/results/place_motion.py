@@ -13,6 +13,7 @@ from cms.body.stress import stress_of, von_mises_of
 from cms.errors import BodyError
 from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.presentation import presented
 from floatframe.errors import ResultsError
 from floatframe.model.bodies.marker_shape import (
     BodyFrameMotion,
@@ -45,6 +46,7 @@ __all__ = [
 ]
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class PlaceMotion:
     """Motion over time of a point with axes, in ground axes."""

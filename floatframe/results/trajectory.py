@@ -21,6 +21,7 @@ from floatframe.results.validity import ValidityNote, notes_from_json
 __all__ = ["BodyMotion", "Drift", "Energies", "Reaction", "Trajectory", "read_trajectory"]
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class BodyMotion:
@@ -38,6 +39,7 @@ class BodyMotion:
     q_ddot: Array  #: second rates of the modal coordinates, (n_t, n_q)
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Energies:
@@ -61,6 +63,7 @@ class Energies:
         return self.total - self.work + self.dissipated
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Reaction:
@@ -70,6 +73,7 @@ class Reaction:
     moment: Array  #: moment on marker A, (n_t, 3) [N m]; zero if the connection has no moment
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Drift:

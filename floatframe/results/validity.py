@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from floatframe.errors import ModelError
 
@@ -19,6 +20,7 @@ OF_ENERGY = ("energy", "damping")  #: kinds of notes about energy that the steps
 KINDS = (*OF_FRAMES, "steps", *OF_ENERGY, *OF_LAWS, *OF_ANGLES)
 
 
+@presented
 @dataclass(frozen=True)
 @checked_fields(ModelError)
 class ValidityNote:

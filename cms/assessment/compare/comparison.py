@@ -8,11 +8,13 @@ from typing import Any, Literal
 from cms.assessment.quality.record import QualityRecord
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.documents.table import Table, Tabular
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.units import Units
 
 __all__ = ["Comparison", "Drawing", "FullResults", "Point", "SetResult"]
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class Point:
     """Result of a mode set with one number of vibration modes."""
@@ -32,6 +34,7 @@ class Point:
         raise KeyError(name)
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class SetResult:
     """Results of a mode set for several numbers of vibration modes."""
@@ -84,6 +87,7 @@ class Drawing:
     n_triangles_full: int  #: number of triangles of the surface before it was thinned for the screen
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class Comparison(Tabular):
     """Comparison of mode sets of one body with its full model."""

@@ -22,6 +22,7 @@ from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets import MODE_SETS
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.tall.columns import in_memory
 from fe_models.foundation.words import nearest, quoted
 
@@ -41,6 +42,7 @@ class Trial:
     where: str  #: place of the largest error, for messages
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class Selection:
     """Chosen mode set and the reason for the choice."""

@@ -15,6 +15,7 @@ from cms.assessment.quality.of_reduction.frequencies import mac
 from cms.assessment.quality.record import plain
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.documents.table import Table, Tabular
+from fe_models.foundation.presentation import presented
 
 __all__ = [
     "Correlation",
@@ -155,6 +156,7 @@ class Pairing:
     window: float = WINDOW
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class Correlation(Tabular):
     """Comparison of a test and a model."""

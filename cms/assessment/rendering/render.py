@@ -19,6 +19,7 @@ from cms.assessment.rendering.film import FILM_SUFFIXES, PICTURE_SUFFIXES, requi
 from cms.assessment.rendering.scene import Scene
 from cms.assessment.rendering.scene_file import write_scene
 from fe_models.foundation.paths import is_stream
+from fe_models.foundation.presentation import presented
 
 __all__ = ["Drawing", "render_animation", "render_picture"]
 
@@ -29,6 +30,7 @@ WORKER = (sys.executable, "-P", "-m", "cms.assessment.rendering.worker")
 SILENCE = 120.0  #: time without a new frame after which the worker is considered dead [s]
 
 
+@presented
 @dataclass(frozen=True)
 class Drawing:
     """Picture or film in a file, and the library that drew it."""

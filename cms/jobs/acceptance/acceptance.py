@@ -15,6 +15,7 @@ from cms.body.reduced_body import ReducedBody
 from cms.jobs.acceptance.origin import SourceFile, origin_groups
 from cms.jobs.acceptance.range_of_use import RangeOfUse
 from cms.jobs.studies.mesh_convergence import MeshConvergence
+from fe_models.foundation.presentation import presented
 
 __all__ = ["VERDICT_WORDS", "Acceptance", "LeftOut", "MeshError"]
 
@@ -49,6 +50,7 @@ class MeshError:
         return float("nan") if self.estimate is None else float(np.abs(self.estimate.error).max())
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class Acceptance:
     """A body, its origin, every check, and its range of use."""

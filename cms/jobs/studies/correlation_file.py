@@ -23,6 +23,7 @@ from fe_models.assembly.assemble import assemble
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.parametric_file import read_parametric
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.stages import Stages
 from fe_models.foundation.toml_file import PathBeside, Table, Vector3, kind_field, read_toml, validated, value_of
 from fe_models.foundation.units import Units, unit_system
@@ -126,6 +127,7 @@ class CorrelationFile(Table):
     update: UpdateTable | None = Field(None, description="a table [update]")
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class CorrelationResult:
     """Results of a correlation."""

@@ -11,6 +11,7 @@ from fe_models.body.couplings.couplings import mean_motion
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
 from fe_models.foundation.errors import ArgumentError
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from fe_models.foundation.tall.columns import of_this_process
 
@@ -20,6 +21,7 @@ INDEFINITE = 1e-10  #: relative negative eigenvalue of a scaled load, above whic
 COLLINEAR = 1e-6  #: ratio of the second radius of the members to the first, below which they are collinear
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class InterfaceLoad:

@@ -23,6 +23,7 @@ from cms.reduction.basis.node_results import node_weights, reference_motion, wei
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.rigid_motion import MassLoads, rigid_motion_of_dofs
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.tall.columns import combine, of_this_process
 
 __all__ = [
@@ -125,6 +126,7 @@ def turned_rigid_work(body: FEBody, forces: Array, frame: BodyFrame) -> Array:
 # static states of the unit loads, the part of the geometric stiffness that needs the factorisation --------------------
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class UnitStates:
     """The balanced unit loads of a body in one frame, and the static responses to them."""

@@ -26,6 +26,7 @@ from fe_models.foundation.arrays import MOTION_COMPONENTS, Array
 from fe_models.foundation.documents.table import Table
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.paths import replace_files
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from fe_models.foundation.seal import reason
 from fe_models.foundation.units import Dimensions, Units, unit_text
@@ -291,6 +292,7 @@ RECOVERY_FORMATS: dict[str, Callable[[Path, _Content], Files]] = {
 # = (M y'' + D y' + K y - G p)_b.
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class InterfaceRows:
     """Rows over (u_b, eta): `displacement` @ y + `velocity` @ y' + `acceleration` @ y'' + `load` @ p."""
@@ -308,6 +310,7 @@ class InterfaceRows:
         return np.asarray(total if p is None else total + np.asarray(p) @ self.load.T)
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class CraigBampton:

@@ -7,6 +7,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ArgumentError
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 
 __all__ = ["FACE_KINDS", "CadFace", "cad_faces"]
@@ -19,6 +20,7 @@ KERNEL_TOLERANCE = 1e-7  #: margin that the CAD kernel adds to its bounding boxe
 INSIDE = 1e-5  #: distance from a face, divided by the diagonal, of the points that are tested for being in the material
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class CadFace:

@@ -12,6 +12,7 @@ from fe_models.files.matrices.body import MatrixReport, body_from_foreign, nodes
 from fe_models.files.matrices.foreign_matrices import ForeignMatrices
 from fe_models.files.matrices.given import body_from_npz
 from fe_models.foundation.errors import ArgumentError, BodyError
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from fe_models.foundation.stages import Stages
 from fe_models.meshes.mesh import Mesh
@@ -20,6 +21,7 @@ from fe_models.meshes.node_cloud import NodeCloud
 __all__ = ["GivenArrays", "GivenMatrices"]
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class GivenMatrices:
@@ -57,6 +59,7 @@ class GivenMatrices:
         return body.with_load_cases(*load_cases_of(model.tables.load_cases, body, geometry))
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class GivenArrays:

@@ -23,6 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from floatframe.engine.compiling.system import CompiledSystem
 from floatframe.engine.initial_conditions.constraint_words import open_joints
 from floatframe.engine.initial_conditions.initial import has_normal_friction
@@ -51,6 +52,7 @@ SETTLED = 1e-11  #: last change of q, relative to the size of q, at convergence
 LEAST_SHAPE = 1e-14  #: deformation, relative to the size of the system, that counts as zero if all loads vanish
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class Instant:
     """Motion of all bodies at one time."""

@@ -10,6 +10,7 @@ import numpy as np
 import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from floatframe.analyses.equilibrium import (
     CLOSED,
@@ -401,6 +402,7 @@ STUCK = 1e-4  #: change of unknowns, relative to their sizes, below which a cons
 SHORTEST = 1e-4  #: smallest damping factor of a Newton step
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class SteadyMotion:

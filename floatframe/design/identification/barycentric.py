@@ -19,6 +19,7 @@ import numpy as np
 import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from floatframe.design.identification.inertial_parameters import INERTIAL, parameters_in, point_mass
 from floatframe.design.identification.regressors import LinearForm
 from floatframe.design.identification.tree_samples import as_placed, rigid_tree, tree_samples
@@ -26,6 +27,7 @@ from floatframe.design.identification.tree_samples import as_placed, rigid_tree,
 __all__ = ["BarycentricParameters", "barycentric_parameters"]
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class BarycentricParameters:
     """Parameters of augmented bodies, which are linear in the parameters of the bodies."""

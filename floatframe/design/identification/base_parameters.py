@@ -14,6 +14,7 @@ import numpy as np
 import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.words import nearest, quoted
 from floatframe.design.identification.inertial_parameters import PAIRS, parameters_in, point_mass
 from floatframe.design.identification.regressors import LinearForm
@@ -415,6 +416,7 @@ N_SAMPLES = 60  #: smallest number of random instants per body
 LOOP_REACH = 0.3
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class BaseParameters:
     """Combinations beta = B phi of parameters."""

@@ -118,6 +118,7 @@ class Measured:
         return made[self.used], measured[self.used]
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class Estimate:
     """Estimated base parameters."""

@@ -22,6 +22,7 @@ import scipy.linalg as la
 from scipy.optimize import LinearConstraint, minimize
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.design.identification.base_parameters import (
@@ -64,6 +65,7 @@ class MotionLimits:
     torque: float = np.inf
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class ExcitingMotion:

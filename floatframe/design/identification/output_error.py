@@ -94,6 +94,7 @@ class MeasuredOutputs:
         return np.column_stack([np.asarray(column, dtype=float) for column in self.values.values()])
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class OutputFit:

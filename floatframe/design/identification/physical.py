@@ -16,6 +16,7 @@ import scipy.linalg as la
 from scipy.optimize import least_squares
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from floatframe.design.identification.estimation import Estimate
 from floatframe.design.identification.inertial_parameters import PAIRS, pseudo_inertia, system_with
 from floatframe.errors import ModelError
@@ -26,6 +27,7 @@ __all__ = ["RealParameters", "real_parameters"]
 LOWER = np.tril_indices(4)
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class RealParameters:
     """Physically consistent parameters, and the quality of their fit."""

@@ -17,6 +17,7 @@ import numpy as np
 import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array, IntArray, tilde
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.words import nearest, quoted
 from floatframe.design.identification.inertial_parameters import INERTIAL, inertia_columns, parameters_of
 from floatframe.design.identification.tree_samples import (
@@ -283,6 +284,7 @@ DRIVE_TERMS = {
 }
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class LinearForm:
     """The parameters of a linear form, in the order of its columns."""

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.words import quoted
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.kernels.model import Model
@@ -29,6 +30,7 @@ __all__ = [
 ]  # fmt: skip
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class TreeSamples:
     """A motion of n_b bodies by n_c joint columns at n instants, in ground axes unless stated otherwise."""

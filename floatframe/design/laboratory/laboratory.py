@@ -51,6 +51,7 @@ __all__ = ["BodyShelf", "CaseResult", "LaboratoryResult", "Reference", "study"]
 LEAST_RANGE = 1e-6  #: range of a column, relative to the largest column of its sensor, below which it does not move
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class Reference:

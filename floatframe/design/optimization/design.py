@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from floatframe.design.studies.study_file import Output, Study
 
 __all__ = ["Design", "DesignParameter", "Quantity"]
@@ -21,6 +22,7 @@ class DesignParameter:
     start: float
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class Quantity:
     """A number taken from an evaluation, and its goal or limits."""
@@ -43,6 +45,7 @@ class Quantity:
         return self.target is not None or self.values is not None
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class Design:
     """A system, its free parameters, objectives and constraints, and how to find the best."""

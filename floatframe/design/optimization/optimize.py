@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.tasks.campaign import Campaign, TaskJournal
 from fe_models.foundation.tasks.task_map import TaskMap
 from fe_models.foundation.tasks.workers import Workers, tasks_of
@@ -48,6 +49,7 @@ class Evaluated:
     is_known: bool  #: whether it comes from the journal
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class OptimizationResult:
     """The best point, and the history of the search."""

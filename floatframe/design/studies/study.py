@@ -16,6 +16,7 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.digest import file_digest
 from fe_models.foundation.documents.table import Table, Tabular
 from fe_models.foundation.errors import ReportedError
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.tasks.campaign import Campaign, campaign_digest, open_task_journal
 from fe_models.foundation.tasks.workers import Workers
 from fe_models.foundation.words import nearest, quoted
@@ -76,6 +77,7 @@ KIND = "floatframe sweep journal 2"
 EXTREMES: dict[str, Callable[[Array], float]] = {"least": np.nanmin, "greatest": np.nanmax}  #: over all modes
 
 
+@presented
 @dataclass(frozen=True)
 class StudyTable(Tabular):
     """All points of a study, in order."""

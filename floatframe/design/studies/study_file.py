@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.tasks.task_map import WorkerError
 from fe_models.foundation.tasks.workers import WORKERS_HELP, checked_workers
 from fe_models.foundation.toml_file import Table, choice, existing_file, kind_field, read_toml, validated
@@ -147,6 +148,7 @@ class Output:
     take: str
 
 
+@presented
 @dataclass(frozen=True)
 class Study:
     """A system, its parameters, and the outputs."""

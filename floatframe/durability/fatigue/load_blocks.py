@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import FatigueError, ModelError
 from floatframe.results.trajectory import Trajectory
@@ -15,6 +16,7 @@ __all__ = ["GAP", "LoadBlock", "block_of_results"]
 GAP = 10.0  #: ratio to the median time step above which a step is a gap
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)

@@ -12,6 +12,7 @@ import numpy as np
 import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from floatframe.engine.compiling.system import CompiledSystem
 from floatframe.engine.initial_conditions.newton_equations import linearized, set_iterate, with_mass_for_all
 from floatframe.engine.kernels.model import Model
@@ -24,6 +25,7 @@ __all__ = ["Mobility", "constraint_mobility", "scaled_constraints"]
 DEPENDENT = 1e-7  #: norm of a unit row after projection out of earlier rows, below which it is redundant
 
 
+@presented
 @dataclass(frozen=True)
 class Mobility:
     """Numbers of freedoms and constraints of a system at one state."""

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import quoted
 from floatframe.engine.compiling.file_frames import state_of_engine, state_of_file
@@ -51,6 +52,7 @@ class AccelerationDerivatives(NamedTuple):
     by_force: Array  #: derivative by forces, M⁻¹
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class RelativeModel:

@@ -90,6 +90,7 @@ class Picture:
     name: str = ""
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Link:
@@ -126,6 +127,7 @@ class Mimic:
     offset: float = 0.0
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class RobotJoint:

@@ -18,6 +18,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.paths import replace_file
+from fe_models.foundation.presentation import presented
 from floatframe.engine.compiling.markers import joint_markers
 from floatframe.engine.compiling.placing import placed_bodies
 from floatframe.engine.compiling.system import compiled_system
@@ -57,6 +58,7 @@ TYPES: dict[type, str] = {
 }  # fmt: skip
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class ExportedRobot:
     """A robot exported from a system."""

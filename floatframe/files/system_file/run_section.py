@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.toml_file import PathBeside, Table, choice
 from fe_models.foundation.words import nearest
 from floatframe.analyses.equilibrium import static_equilibrium
@@ -125,6 +126,7 @@ class RunSection(Table):
         )  # fmt: skip
 
 
+@presented
 @dataclass(frozen=True)
 class RunOptions:
     """The options in the table [run]."""

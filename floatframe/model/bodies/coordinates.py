@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from fe_models.foundation.arrays import GivenArray, given
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
@@ -11,6 +12,7 @@ from floatframe.model.checked_values import unit_vector
 __all__ = ["AxialAngle", "AxialDistance", "Coordinate", "JointCoordinateName", "PointDistance", "coordinate_of"]
 
 
+@presented
 @dataclass(frozen=True)
 @checked_fields(ModelError)
 class JointCoordinateName:

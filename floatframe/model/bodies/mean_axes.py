@@ -29,6 +29,7 @@ from cms.body.reduced_body import ReducedBody
 from cms.reduction.basis.frames import TisserandFrame
 from cms.reduction.frame_conversion import converted
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from floatframe.model.bodies.marker_shape import BodyFrameMotion, MarkerShape, marker_motion, motion_in_body
 from floatframe.model.rotations import (
     cross,
@@ -46,6 +47,7 @@ EPSILON = np.cross(np.eye(3)[:, None], np.eye(3)[None])
 _made: WeakKeyDictionary[ReducedBody, "MeanAxes | None"] = WeakKeyDictionary()
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class FrameMotion:
     """Motion of a body frame and its modal coordinates; arrays may have any number of time dimensions."""
@@ -66,6 +68,7 @@ class FrameMotion:
         return BodyFrameMotion(self.r, rotation_matrix(self.p), self.v, self.omega, self.v_dot, self.omega_dot)
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class MeanAxes:
     """A stiffened body in mean axes, with the transformations to and from the frame of its file."""

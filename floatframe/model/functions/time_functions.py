@@ -10,6 +10,7 @@ from math import factorial, perm
 import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import ModelError
 from floatframe.model.checked_values import number
@@ -35,6 +36,7 @@ MOST_PIECES = 20000
 NOT_OF_TIME = {"of_time": False}
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)

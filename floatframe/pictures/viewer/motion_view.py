@@ -18,6 +18,7 @@ from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.documents.html import asset as document_asset
 from fe_models.foundation.documents.html import text
 from fe_models.foundation.paths import replace_file
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.units import Units
 from floatframe.analyses.snapshot import Equilibrium, snapshot
 from floatframe.errors import ResultsError
@@ -219,6 +220,7 @@ SHARE_OF_ROWS = 0.4  #: fraction of the numbers of a page for the rows of the mo
 VISIBLE, DRAWN = 0.02, 0.06
 
 
+@presented
 @dataclass(frozen=True)
 class Page:
     """A written page."""

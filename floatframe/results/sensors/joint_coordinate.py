@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
@@ -32,6 +33,7 @@ __all__ = ["JointCoordinate"]
 ENDINGS = {None: "", 0: "", 1: ".rate", 2: ".acceleration"}
 
 
+@presented
 @dataclass(frozen=True)
 @checked_fields(ModelError)
 class JointCoordinate(JointCoordinateName):

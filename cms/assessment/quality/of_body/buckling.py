@@ -8,6 +8,7 @@ import scipy.linalg as la
 from cms.assessment.quality.record import QualityRecord, information, judge
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.units import Units
 
 __all__ = ["CriticalLoad", "check_buckling", "critical_loads"]
@@ -16,6 +17,7 @@ AXES = ("x", "y", "z")
 NEGLIGIBLE = 1e-10  #: eigenvalue relative to the largest of the same load, below which its direction does not buckle
 
 
+@presented
 @dataclass(frozen=True)
 class CriticalLoad:
     """Amplitudes at which one load makes the stiffness of the body singular; infinite if it never does."""

@@ -10,6 +10,7 @@ from cms.assessment.quality.reference.free_pencil import free_elastic_modes, fre
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import MOTION_COMPONENTS, Array, frozen
 from fe_models.foundation.documents.table import Table, Tabular
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 
@@ -35,6 +36,7 @@ class PortModel:
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class FrequencyResponse(Tabular):
     """Receptance between ports: displacement / force, rotation / moment, in units and axes of the mesh of the body."""

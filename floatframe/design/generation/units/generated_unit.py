@@ -18,6 +18,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 import numpy as np
 
 from fe_models.foundation.paths import replace_file
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.words import quoted
 from floatframe.design.generation.generate import identifier, notes_of, require_free
 from floatframe.design.generation.graph import SYMBOL, Scalar, reachable
@@ -103,6 +104,7 @@ method divides it into equal steps of at most the parameter {}. States can be sa
 STABLE = 2.6  #: largest product of the step and the fastest frequency
 
 
+@presented
 @dataclass(frozen=True)
 class GeneratedUnit:
     """The result of `generate_fmu`."""

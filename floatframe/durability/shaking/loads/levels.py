@@ -12,6 +12,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.paths import near_file
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
@@ -35,6 +36,7 @@ OF_OUTPUT = "output"  #: unit in which the output of a limit is listed: g for ac
 FEWEST = 2  #: smallest number of rows
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class Level:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from floatframe.durability.shaking.loads.levels import Level
 from floatframe.durability.shaking.responses.response_spectrum import shock_response_spectrum
 from floatframe.errors import ModelError
@@ -75,6 +76,7 @@ def pulse(kind: str, amplitude: float, duration: float, *, edge: float = EDGE) -
     return np.asarray(x, dtype=float) * duration, np.asarray(y, dtype=float) * amplitude
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 class Synthesis:
     """An acceleration synthesised for a target spectrum, and the deviation of its spectrum."""
