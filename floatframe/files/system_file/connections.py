@@ -1,6 +1,6 @@
 """Sections of joints and forces of a system file."""
 
-from typing import Annotated, cast
+from typing import Annotated, Any, cast
 
 import numpy as np
 from pydantic import Field
@@ -9,9 +9,18 @@ from fe_models.foundation.toml_file import Table
 from fe_models.foundation.units import Quantity
 from floatframe.errors import ModelError
 from floatframe.files.system_file.coordinate_section import CoordinateSection
-from floatframe.files.system_file.described import DescribedSection, OneOf, Signals
-from floatframe.files.system_file.motion_section import MotionSection, require_quantity
+from floatframe.files.system_file.described import (
+    KEYS,
+    DescribedSection,
+    Either,
+    FunctionTable,
+    OneOf,
+    Signals,
+    python_value,
+)
+from floatframe.files.system_file.motion_section import require_quantity
 from floatframe.model.forces import FORCES, Force, PointForce
+from floatframe.model.functions.time_functions import TimeFunction
 from floatframe.model.joints import JOINTS, Joint
 from floatframe.model.joints.coordinate_coupler import CoordinateCoupler, Limits
 
@@ -56,11 +65,14 @@ class LimitsSection(Table):
         return Limits(self.lower, self.upper, self.restitution)
 
 
+NumberOrFunction = Annotated[Any, Either((KEYS[float], KEYS[TimeFunction]))]
+
+
 class CouplerSection(Table):
     """[couplers.NAME]: a linear relation between coordinates."""
 
     terms: list[TermSection] = Field(description="tables [[couplers.NAME.terms]], coordinates with factors")
-    constant: float | MotionSection | None = Field(
+    constant: NumberOrFunction | None = Field(
         None, description="a number, or a function of time; default: as placed, or as caught by an event"
     )
     engaged: bool = Field(True, description="false: no force until an event switches it on (latch, clutch, brake)")
@@ -71,19 +83,18 @@ def joint_of(name: str, section: DescribedSection, signals: Signals = None) -> J
     """Return the joint of a table; `signals` are those of the system file, by name."""
     for coordinate, table in (getattr(section, "motions", None) or {}).items():
         expected = ("angle",) if coordinate.startswith("angle") else ("length",)
-        if isinstance(table, MotionSection):
+        if isinstance(table, FunctionTable):
             require_quantity(f"joints.{name}.motions.{coordinate}", table, signals, expected)
     return cast(Joint, section.object_named(name, signals))
 
 
 def coupler_of(name: str, section: CouplerSection, signals: Signals = None) -> CoordinateCoupler:
     """Return the coupler of a table."""
-    constant = section.constant
     terms = [(term.found(), term.factor) for term in section.terms]
     return CoordinateCoupler(
         name,
         terms,
-        constant.function(signals) if isinstance(constant, MotionSection) else constant,
+        python_value(section.constant, signals),
         section.engaged,
         None if section.limits is None else section.limits.found(),
     )
@@ -99,13 +110,13 @@ ForceSection = Annotated[DescribedSection, OneOf(FORCES, "forces.NAME", "force")
 def force_of(name: str, section: DescribedSection, signals: Signals = None) -> Force:
     """Return the force of a table; `signals` are those of the system file, by name."""
     motor, law, laws = (getattr(section, key, None) for key in ("motor", "characteristic", "characteristics"))
-    if isinstance(motor, MotionSection):
+    if isinstance(motor, FunctionTable):
         require_quantity(f"forces.{name}.motor", motor, signals, ("force", "moment", "number"))
     for key, table in {
         "characteristic": law,
         **{f"characteristics.{key}": each for key, each in (laws or {}).items()},
     }.items():
-        if isinstance(table, MotionSection) and any(True for _ in table.signals()):
+        if isinstance(table, FunctionTable) and any(True for _ in table.signals()):
             raise ModelError(f"forces.{name}.{key}: a function of a deformation, expected no signal over time")
     if section.described is PointForce and not {"force", "torque"} & section.model_fields_set:
         raise ModelError(f"forces.{name}: expected force or torque or both, got neither")

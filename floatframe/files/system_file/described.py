@@ -7,8 +7,8 @@ JSON schema and the reference page of the keys follow from the class.
 import inspect
 import logging
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from functools import cache
 from pathlib import Path
 from types import GenericAlias, NoneType, UnionType
@@ -23,6 +23,7 @@ from pydantic import (
     TypeAdapter,
     ValidationError,
     ValidationInfo,
+    WithJsonSchema,
     create_model,
 )
 from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
@@ -32,7 +33,6 @@ from fe_models.foundation.toml_file import Matrix3, Table, choice, existing_file
 from floatframe.errors import ModelError, SignalError
 from floatframe.files.system_file.coordinate_section import CoordinateSection, NamedCoordinate
 from floatframe.files.system_file.keys import Name
-from floatframe.files.system_file.motion_section import MotionSection
 from floatframe.files.system_file.place_key import (
     TOLERANCE_WORDS,
     MeasuredPlace,
@@ -41,9 +41,10 @@ from floatframe.files.system_file.place_key import (
     PlaceOnBody,
     marker_of,
 )
-from floatframe.files.system_file.signal_section import SignalFunction
+from floatframe.files.system_file.signal_section import SignalFunction, function_named
 from floatframe.model.bodies.coordinates import JointCoordinateName
 from floatframe.model.bodies.markers import Marker
+from floatframe.model.functions.registry import TIME_FUNCTIONS
 from floatframe.model.functions.time_functions import TimeFunction
 
 __all__ = [
@@ -132,7 +133,7 @@ class DescribedSection(AcceptedTable):
     def object_named(self, name: str = "", signals: Signals = None) -> Any:
         """Return the object of the table."""
         given: dict[str, Any] = {}
-        for each in own_fields(self.described):
+        for each in parts_of(self.described):
             hint = hints_of(self.described)[each.name]
             if is_marker(each.name, hint):
                 keys = marker_keys(each.name, is_measured=self.is_measured)
@@ -149,8 +150,8 @@ class DescribedSection(AcceptedTable):
 
 def python_value(value: Any, signals: Signals) -> Any:
     """Return the value of a field from that of a key."""
-    if isinstance(value, MotionSection):
-        return value.function(signals)
+    if isinstance(value, FunctionTable):
+        return value.object_named("", signals)
     if isinstance(value, CoordinateSection):
         return value.found()
     if isinstance(value, MarkerSection):
@@ -165,9 +166,25 @@ def python_value(value: Any, signals: Signals) -> Any:
 # keys of a class ------------------------------------------------------------------------------------------------------
 
 
-def own_fields(kind: Any) -> list[Field[Any]]:
-    """Return the fields of a class without its name."""
-    return [each for each in fields(kind) if each.init and each.name != "name"]
+@dataclass(frozen=True)
+class Part:
+    """A field of a dataclass, or an argument of a function, with its default; `MISSING` if it has none."""
+
+    name: str
+    default: Any
+
+
+def parts_of(kind: Any, left_out: tuple[str, ...] = ("name",)) -> list[Part]:
+    """Return the fields of a dataclass, or the arguments of a function, without those that are left out."""
+    if is_dataclass(kind):
+        own = [each for each in fields(kind) if each.init]
+        found = [
+            (each.name, each.default if each.default_factory is MISSING else each.default_factory()) for each in own
+        ]
+    else:
+        given = inspect.signature(kind).parameters.values()
+        found = [(each.name, MISSING if each.default is each.empty else each.default) for each in given]
+    return [Part(name, default) for name, default in found if name not in left_out]
 
 
 @cache
@@ -271,15 +288,13 @@ def section_of(name: str, kind: Any, place: str, stated: tuple[type, ...], is_me
     """
     keys: dict[str, Any] = {}
     hints, meanings = hints_of(kind), meanings_of(kind)
-    for each in own_fields(kind):
+    for each in parts_of(kind):
         hint, meaning = hints[each.name], meanings.get(each.name, "")
-        default = each.default if each.default_factory is MISSING else each.default_factory()
         if is_marker(each.name, hint):
-            keys |= fields_of_marker(each.name, meaning, is_measured=is_measured, is_needed=default is MISSING)
+            keys |= fields_of_marker(each.name, meaning, is_measured=is_measured, is_needed=each.default is MISSING)
         elif not is_named(hint, name):
-            keys |= fields_of_value(
-                each.name, hint, meaning, is_needed=default is MISSING or isinstance(default, stated)
-            )
+            is_needed = each.default is MISSING or isinstance(each.default, stated)
+            keys |= fields_of_value(each.name, hint, meaning, is_needed=is_needed)
     model = model_of_keys(kind, f"[{place}]", name, DescribedSection, keys)
     model.is_measured = is_measured
     return model
@@ -298,19 +313,17 @@ def model_of_keys(kind: Any, place: str, name: str, base: type[Model], keys: Map
     text = f'{place} of type "{name}": {summary}' if name else f"{place}: {summary}"
     title = {"title": name} if name else {}
     model = create_model(kind.__name__, __base__=base, __doc__=text, __cls_kwargs__=title, **typed, **keys)
-    model.described = kind
+    model.described = kind if isinstance(kind, type) else staticmethod(kind)
     return model
 
 
 def keys_of_fields(kind: Any, left_out: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Return the keys of the fields of a dataclass, without those that are left out; a marker is a table."""
+    """Return the keys of the fields of a dataclass or the arguments of a function; a marker is a table."""
     meanings = meanings_of(kind)
     keys: dict[str, Any] = {}
-    for each in fields(kind):
-        if each.init and each.name not in left_out:
-            hint, meaning = hints_of(kind)[each.name], meanings.get(each.name, "")
-            is_needed = each.default is MISSING and each.default_factory is MISSING
-            keys |= fields_of_value(each.name, hint, meaning, is_needed=is_needed)
+    for each in parts_of(kind, left_out):
+        hint, meaning = hints_of(kind)[each.name], meanings.get(each.name, "")
+        keys |= fields_of_value(each.name, hint, meaning, is_needed=each.default is MISSING)
     return keys
 
 
@@ -376,7 +389,13 @@ class Either:
 
     def model_of(self, value: Any) -> Any:
         """Return the type of a table that the value may be."""
-        return next((key.type for key in self.keys if isinstance(key.type, type) and issubclass(key.type, Table)), None)
+        for key in self.keys:
+            for note in getattr(key.type, "__metadata__", ()):
+                if hasattr(note, "model_of"):
+                    return note.model_of(value)
+            if isinstance(key.type, type) and issubclass(key.type, Table):
+                return key.type
+        return None
 
     def validated(self, value: Any, info: ValidationInfo) -> Any:
         """Return the value as the first type that takes it; else the problem is that of the type that fits best."""
@@ -404,26 +423,6 @@ def numbers_of_any_shape(value: Any) -> Any:
         return np.array(value, dtype=float)
     except (TypeError, ValueError):
         raise ValueError("expected numbers, in lists of one length") from None
-
-
-ExistingFile = Annotated[Path, BeforeValidator(existing_file())]
-Numbers = list[float] | list[list[float]]
-#: what a file gives for the fields of a type
-KEYS: dict[Any, Key] = {
-    float: Key(float, "a number"),
-    int: Key(int, "a whole number"),
-    bool: Key(bool, "true or false"),
-    str: Key(str, "text"),
-    Any: Key(Any, "a value"),
-    Path: Key(ExistingFile, "the path of a file"),
-    Marker: Key(MarkerSection, 'a marker, {body = "NAME", marker = "INTERFACE" or [x, y, z]}'),
-    TimeFunction: Key(MotionSection, "the table of a function"),
-    JointCoordinateName: Key(NamedCoordinate, '"JOINT.COORDINATE" or a table of a coordinate'),
-    Address: Key(NodeOrPosition, "a position [x, y, z] in the body, or {node = 12}"),
-    np.ndarray: Key(
-        Annotated[Any, PlainValidator(numbers_of_any_shape, json_schema_input_type=Numbers)], "a list of numbers"
-    ),
-}
 
 
 class AnyTable(Table):
@@ -507,7 +506,7 @@ class OneOf(ObjectOf):
         field = pydantic.Field(description=f"one of {', '.join(self.kind)}")
         return create_model(self.what, __base__=AnyTable, type=(typed, field))
 
-    def section(self, kind: str) -> type[DescribedSection]:
+    def section(self, kind: str) -> type[AcceptedTable]:
         """Return the model of the tables of a type."""
         return section_of(kind, self.kind[kind], self.place, self.stated, self.is_measured)
 
@@ -531,3 +530,78 @@ def definition(name: str, model: type[Table], handler: Any) -> dict[str, Any]:
         schema = core_schema.definitions_schema(core_schema.definition_reference_schema(ref), [named])
     found: dict[str, Any] = handler(schema)
     return found
+
+
+# functions of time ----------------------------------------------------------------------------------------------------
+
+
+class FunctionTable(AcceptedTable):
+    """A function of time of a given type; the other keys are the arguments of that function."""
+
+    is_typed = True
+    type: Any
+
+    def object_named(self, name: str = "", signals: Signals = None) -> TimeFunction:
+        """Return the function of the table; `signals` are those of the system file, by name."""
+        given = self.python_values(signals)
+        if "signal" in given:
+            given["signal"] = function_named(given["signal"], signals or {}).function
+        found: TimeFunction = self.described(**given)
+        return found
+
+    def signals(self) -> Iterator[str]:
+        """Yield the names of the signals that the function contains, including those in its pieces."""
+        values = dict(self)
+        if values.get("signal") is not None:
+            yield values["signal"]
+        for piece in values.get("pieces") or ():
+            yield from piece.signals()
+
+
+class OneFunction(OneOf):
+    """Annotation of the table of a function, whose key `type` names it."""
+
+    def section(self, kind: str) -> type[FunctionTable]:
+        """Return the model of the tables of a type."""
+        return function_table_of(kind)
+
+
+#: a function of time, such as [joints.NAME.motions.COORDINATE]
+MotionSection = Annotated[FunctionTable, OneFunction(TIME_FUNCTIONS, "joints.NAME.motions.COORDINATE", "motion")]
+
+
+@cache
+def function_table_of(kind: str) -> type[FunctionTable]:
+    """Return the model of the tables of a function; a signal is named, and pieces are tables of functions."""
+    special = {
+        "signal": (Name, pydantic.Field(description="the name of a table [signals.NAME]")),
+        "pieces": (
+            Annotated[list[MotionSection], WithJsonSchema({"type": "array", "items": {"type": "object"}})],
+            pydantic.Field(description=f"a list of tables: {meanings_of(TIME_FUNCTIONS[kind]).get('pieces')}"),
+        ),
+    }
+    keys = {key: special.get(key, value) for key, value in keys_of_fields(TIME_FUNCTIONS[kind]).items()}
+    return model_of_keys(TIME_FUNCTIONS[kind], "[joints.NAME.motions.COORDINATE]", kind, FunctionTable, keys)
+
+
+# values ---------------------------------------------------------------------------------------------------------------
+
+
+ExistingFile = Annotated[Path, BeforeValidator(existing_file())]
+Numbers = list[float] | list[list[float]]
+#: what a file gives for the fields of a type
+KEYS: dict[Any, Key] = {
+    float: Key(float, "a number"),
+    int: Key(int, "a whole number"),
+    bool: Key(bool, "true or false"),
+    str: Key(str, "text"),
+    Any: Key(Any, "a value"),
+    Path: Key(ExistingFile, "the path of a file"),
+    Marker: Key(MarkerSection, 'a marker, {body = "NAME", marker = "INTERFACE" or [x, y, z]}'),
+    TimeFunction: Key(MotionSection, "the table of a function"),
+    JointCoordinateName: Key(NamedCoordinate, '"JOINT.COORDINATE" or a table of a coordinate'),
+    Address: Key(NodeOrPosition, "a position [x, y, z] in the body, or {node = 12}"),
+    np.ndarray: Key(
+        Annotated[Any, PlainValidator(numbers_of_any_shape, json_schema_input_type=Numbers)], "a list of numbers"
+    ),
+}

@@ -18,7 +18,7 @@ from floatframe.files.signals.resampling import filtered, resampled
 from floatframe.files.signals.signal_units import STANDARD_GRAVITY, SignalUnit, parsed_unit, signal_unit, system_factor
 from floatframe.files.signals.signals import Signal
 from floatframe.files.system_file.keys import Name, NotNegative, Number, Positive
-from floatframe.model.functions.tables import INTERPOLATIONS, acceleration_table, interpolated
+from floatframe.model.functions.tables import INTERPOLATIONS, acceleration_table
 from floatframe.model.functions.time_functions import TimeFunction
 
 __all__ = ["SignalFunction", "SignalSection", "function_named", "signal_functions"]
@@ -122,7 +122,7 @@ class SignalSection(Table):
         values = signal.values * system_factor(signal.unit, units, where)
         if not self.integrate:
             kind = self.interpolation or ("quintic" if quantity in SMOOTH and len(t) >= 6 else "linear")
-            return SignalFunction(name, interpolated(t, values, kind), quantity, signal.notes)
+            return SignalFunction(name, INTERPOLATIONS[kind](t, values), quantity, signal.notes)
         function = acceleration_table(t, values, self.position or 0.0, self.velocity or 0.0)
         end = t[-1:]
         note = (

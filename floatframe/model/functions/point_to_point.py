@@ -38,6 +38,17 @@ def quintic(
 
     Before and after, it continues along its tangents, so it rests there if the velocities are zero.
 
+    Parameters
+    ----------
+    t_start, t_end
+        Times at which the motion begins and ends [s].
+    first, last
+        Values at the beginning and at the end [m or rad].
+    first_velocity, last_velocity
+        Velocities at the beginning and at the end [m/s or rad/s].
+    first_acceleration, last_acceleration
+        Accelerations at the beginning and at the end [m/s² or rad/s²].
+
     Raises
     ------
     ModelError

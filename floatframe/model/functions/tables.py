@@ -7,6 +7,7 @@ interpolates them linearly between the samples; the second integral is a cubic o
 
 from collections.abc import Callable
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 
@@ -137,8 +138,25 @@ INTERPOLATIONS: dict[str, Callable[[Array, Array], TimeFunction]] = {
 }
 
 
-def interpolated(t: Array, values: Array, interpolation: str = "cubic") -> TimeFunction:
-    """Return the function through a table with a named interpolation; raise `ModelError` for an unknown name."""
+def interpolated(
+    t: Array, values: Array, interpolation: Literal["cubic", "linear", "monotone", "quintic"] = "cubic"
+) -> TimeFunction:
+    """Return the function through a table with a named interpolation.
+
+    Parameters
+    ----------
+    t
+        Rising times, (n_t,) [s].
+    values
+        A value for each time, (n_t,).
+    interpolation
+        Curve between the points: cubic, quintic or monotone splines, or lines.
+
+    Raises
+    ------
+    ModelError
+        If there is no interpolation of this name, or the numbers are no table.
+    """
     if interpolation not in INTERPOLATIONS:
         raise ModelError(
             f"table: unknown interpolation {quoted(interpolation)}{nearest(interpolation, INTERPOLATIONS)}"

@@ -115,19 +115,43 @@ def one_piece(coefficients: list[float], sine: tuple[float, float, float] = (0.0
 
 
 def constant(value: float) -> TimeFunction:
-    """Return a constant function."""
+    """Return a constant function.
+
+    Parameters
+    ----------
+    value
+        The value.
+    """
     return one_piece([number("constant: value", value)])
 
 
 def polynomial_of_time(coefficients: list[float]) -> TimeFunction:
-    """Return the polynomial c_0 + c_1 t + c_2 t² + ..., up to t⁵."""
+    """Return the polynomial c_0 + c_1 t + c_2 t² + ..., up to t⁵.
+
+    Parameters
+    ----------
+    coefficients
+        Coefficients of 1, t, t² and so on.
+    """
     if not 1 <= len(coefficients) <= 6:
         raise ModelError(f"polynomial: expected one to six coefficients, c_0 first, got {len(coefficients)}")
     return one_piece([number("polynomial: coefficients", c) for c in coefficients])
 
 
 def harmonic(amplitude: float, omega: float, phase: float = 0.0, offset: float = 0.0) -> TimeFunction:
-    """Return offset + amplitude sin(omega t + phase); omega in rad/s."""
+    """Return offset + amplitude sin(omega t + phase); omega in rad/s.
+
+    Parameters
+    ----------
+    amplitude
+        The amplitude.
+    omega
+        Angular frequency [rad/s].
+    phase
+        Phase at t = 0 [rad].
+    offset
+        Mean value.
+    """
     a, w, p, o = (
         number(f"harmonic: {n}", v)
         for n, v in zip(("amplitude", "omega", "phase", "offset"), (amplitude, omega, phase, offset), strict=True)
@@ -136,7 +160,15 @@ def harmonic(amplitude: float, omega: float, phase: float = 0.0, offset: float =
 
 
 def smooth_step(t_start: float, t_end: float, first: float, last: float) -> TimeFunction:
-    """Return the polynomial of degree five from first to last, with zero rate and second rate at both ends."""
+    """Return the polynomial of degree five from first to last, with zero rate and second rate at both ends.
+
+    Parameters
+    ----------
+    t_start, t_end
+        Times at which the step begins and ends [s].
+    first, last
+        Values before and after the step.
+    """
     t_start, t_end = number("smooth_step: t_start", t_start), number("smooth_step: t_end", t_end)
     first, last = number("smooth_step: first", first), number("smooth_step: last", last)
     if t_end <= t_start:
@@ -153,6 +185,13 @@ def cycloidal_spin_up(omega: float, duration: float) -> TimeFunction:
     """Return omega (t²/(2T) + (T/(2 pi))² (cos(2 pi t/T) - 1)/T) until T, then omega (t - T/2): a gradual spin-up.
 
     Its rate rises from zero to omega without a jump of the acceleration (the spin-up of rotating beams).
+
+    Parameters
+    ----------
+    omega
+        Angular speed or angular frequency that is reached [rad/s].
+    duration
+        Duration T of the spin-up [s].
     """
     omega, T = number("cycloidal_spin_up: omega", omega), number("cycloidal_spin_up: duration", duration, above=0.0)
     s = omega * T / (2 * np.pi) ** 2
@@ -167,6 +206,13 @@ def piecewise(t: Sequence[float], pieces: Sequence[TimeFunction]) -> TimeFunctio
 
     The first piece also holds before t[0], and the last one has no end. Values may jump between pieces (for forces). A
     prescribed motion must not jump in value or rate, and is then rejected.
+
+    Parameters
+    ----------
+    t
+        Rising times at which the pieces begin [s].
+    pieces
+        A function of the time since its beginning for each time.
     """
     begins = [number("piecewise: t", each) for each in t]
     if not begins or len(begins) != len(pieces) or (np.diff(begins) <= 0).any():

@@ -242,7 +242,7 @@ pieces = [
     assert_allclose([motion(t) for t in (-1.0, 0.4, 1.5, 3.0)], [0.5, 0.5, 4.5, 21.5], rtol=1e-14, atol=0)
     for old, new, words in (
         ("[0.5, 0.0, 4.0]", "[0.6, 0.0, 4.0]", "joints.thread.motions: angle: the value jumps by 0.1 at t = 0.5"),
-        ("t = [0.0, 0.5, 2.0]", "t = [0.0, 0.5]", "piecewise: expected rising times and as many functions"),
+        ("t = [0.0, 0.5, 2.0]", "t = [0.0, 0.5]", "motions.angle: expected rising times and as many functions"),
         ("t = [0.0, 0.5, 2.0]", "t = [0.0, 0.5, 0.2]", "the times do not rise"),
         ("value = 0.5", "valeu = 0.5", "pieces.*valeu.*did you mean .value"),
     ):
@@ -262,11 +262,11 @@ pieces = [
             r"lead = 0: expected a number other than zero; use .* joint \(line 20\)",
         ),
         ("omega = 4", "omgea = 4", "motions.angle.omgea: .*did you mean .omega"),
-        ("omega = 4", "", "omega: missing; expected a number, the angular frequency"),
-        ("omega = 4", "omega = 4\nphase = 1", "a cycloidal-spin-up motion has no key phase"),
+        ("omega = 4", "", "omega: missing; expected a number: Angular speed"),
+        ("omega = 4", "omega = 4\nphase = 1", 'phase: unknown key of type "cycloidal-spin-up"'),
         ("motions.angle", "motions.turn", "no coordinate 'turn'; choices: angle"),
         ('"cycloidal-spin-up"', '"cycloid"', 'type = "cycloid": unknown type of motion; choices'),
-        ("duration = 1.0", "duration = 0", "duration: expected a number > 0"),
+        ("duration = 1.0", "duration = 0", r"duration = 0: expected a number > 0, got 0 \(line 25\)"),
     ],
 )
 def test_mistakes_in_motions_are_answered_with_key_value_and_choices(tmp_path, old, new, words):
@@ -343,7 +343,7 @@ def test_a_table_whose_spline_overshoots_is_noted_unless_its_interpolation_is_ch
         (
             "t_start = 0",
             "t_strat = 0",
-            r"forces.motor.motor.t_strat: unknown key; did you mean 't_start'.* \(line 54\)",
+            r"forces.motor.motor.t_strat: unknown key of type .smooth-step.; did you mean 't_start'.* \(line 54\)",
         ),
         ("damping = 0.2", "force = [1, 0, 0]", 'motor.force: unknown key of type "joint-force"; did you mean .free.'),
     ],

@@ -172,7 +172,7 @@ def test_what_was_done_is_said(bench, caplog):
             "forces.push.motor: expected force or moment or number, but signal 'road'",
         ),
         ({"motor": '[forces.push.characteristic]\ntype = "signal"\nsignal = "force"'}, "expected no signal over time"),
-        ({"motion": DRIVEN.format("road", "omega = 1.0")}, "a signal motion has no key omega"),
+        ({"motion": DRIVEN.format("road", "omega = 1.0")}, 'motions.distance.omega: unknown key of type "signal"'),
     ],
 )
 def test_doubtful_signals_are_asked_back(bench, changes, words):

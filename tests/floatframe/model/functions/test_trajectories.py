@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from pydantic import TypeAdapter
 from scipy.interpolate import BPoly
 
 from floatframe import GROUND, Marker, PrismaticJoint
@@ -132,13 +133,16 @@ def test_impossible_motions_are_refused(make, words):
 
 
 def test_system_files_know_them():
-    from floatframe.files.system_file.motion_section import MotionSection
+    from floatframe.files.system_file.described import MotionSection
 
-    table = MotionSection(type="trapezoid", first=0.0, last=1.5, speed=SPEED, acceleration=ACCELERATION, t_start=0.5)
-    assert table.function()(0.5 + 1.5 / SPEED + SPEED / ACCELERATION) == pytest.approx(1.5, abs=1e-12)
-    table = MotionSection(type="quintic", t_start=0.0, t_end=1.0, first=0.0, last=1.0, last_velocity=2.0)
-    assert table.function()(1.0, 1) == pytest.approx(2.0, abs=1e-12)
-    table = MotionSection(type="spline", t=[0.0, 1.0, 3.0], values=[0.0, 1.0, 0.5], degree=5)
-    assert table.function()(1.0) == pytest.approx(1.0, abs=1e-12)
+    def function(kind, **keys):
+        return TypeAdapter(MotionSection).validate_python({"type": kind, **keys}).object_named()
+
+    table = function("trapezoid", first=0.0, last=1.5, speed=SPEED, acceleration=ACCELERATION, t_start=0.5)
+    assert table(0.5 + 1.5 / SPEED + SPEED / ACCELERATION) == pytest.approx(1.5, abs=1e-12)
+    table = function("quintic", t_start=0.0, t_end=1.0, first=0.0, last=1.0, last_velocity=2.0)
+    assert table(1.0, 1) == pytest.approx(2.0, abs=1e-12)
+    table = function("spline", t=[0.0, 1.0, 3.0], values=[0.0, 1.0, 0.5], degree=5)
+    assert table(1.0) == pytest.approx(1.0, abs=1e-12)
     with pytest.raises(ValueError, match="takes at least 2"):
-        MotionSection(type="trapezoid", first=0.0, last=1.0, speed=1.0, acceleration=1.0, duration=0.5)
+        function("trapezoid", first=0.0, last=1.0, speed=1.0, acceleration=1.0, duration=0.5)
