@@ -1,6 +1,8 @@
 """Stages of a long computation: progress and duration of each, and the announcement of a compilation."""
 
+import html
 import logging
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -37,22 +39,50 @@ class Stages:
 
 @contextmanager
 def announced_compilation(log: logging.Logger, code: str, duration: str) -> Iterator[None]:
-    """Log a warning when numba begins to compile inside the block; code that it loads from its cache does not count."""
+    """Log a warning when numba begins to compile inside the block; code that it loads from its cache does not count.
+
+    A notebook also shows a progress bar, with the number of compiled functions.
+    """
     from numba.core.event import Event, Listener, install_listener
 
     class Announcement(Listener):
-        is_made = False
+        began = 0.0
+        n_compiled = 0
+        bar: Any = None
 
         def on_start(self, event: Event) -> None:
-            if not self.is_made:
-                self.is_made = True
+            if not self.began:
+                self.began = time.perf_counter()
                 log.warning(
                     "compiling %s, once on this machine, %s; the command `floatframe prepare` does it in advance",
                     code, duration,
                 )  # fmt: skip
+                self.bar = notebook_bar(f"compiling {code}, {duration}")
 
         def on_end(self, event: Event) -> None:
-            pass
+            self.n_compiled += 1
+            if self.bar is not None:
+                self.bar(f"compiling {code}, {duration}: {self.n_compiled} functions", False)
 
-    with install_listener("numba:compile", Announcement()):
+        def finish(self) -> None:
+            if self.bar is not None:
+                self.bar(f"compiled {code} in {time.perf_counter() - self.began:.0f} s", True)
+
+    announcement = Announcement()
+    with install_listener("numba:compile", announcement):
         yield
+    announcement.finish()
+
+
+def notebook_bar(words: str) -> Callable[[str, bool], None] | None:
+    """Show a progress bar in a notebook; return its update by text and whether it is at its end, None elsewhere."""
+    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
+    if not hasattr(shell, "kernel"):
+        return None
+    from IPython.display import HTML, display
+
+    def shown(text: str, is_at_end: bool) -> Any:
+        return HTML(f"<progress{' value=1' if is_at_end else ''}></progress> {html.escape(text)}")
+
+    handle = display(shown(words, False), display_id=True)
+    return lambda text, is_at_end: handle.update(shown(text, is_at_end))

@@ -54,6 +54,27 @@ class Compilation:
 
 
 @pytest.mark.parametrize("is_stored", [False, True])
+def test_a_notebook_shows_a_bar_while_code_is_compiled(is_stored, monkeypatch):
+    """Three functions are compiled: the first shows the bar, each updates it, and the end fills it."""
+    shown = []
+    handle = SimpleNamespace(update=shown.append)
+    display = SimpleNamespace(HTML=str, display=lambda page, display_id: shown.append(page) or handle)
+    shell = SimpleNamespace(get_ipython=lambda: SimpleNamespace(kernel=object()), display=display)
+    monkeypatch.setitem(sys.modules, "IPython", shell)
+    monkeypatch.setitem(sys.modules, "IPython.display", display)
+    run = entry.CompiledEntry(lambda digest: Compilation(is_stored), entry.__name__, 0)
+    run(what=0)
+    run(what=0)
+    if is_stored:
+        assert shown == []
+        return
+    assert len(shown) == 4
+    assert shown[2].startswith("<progress></progress> compiling the code of motions")
+    assert shown[2].endswith("2 functions")
+    assert shown[3].startswith("<progress value=1></progress> compiled the code of motions")
+
+
+@pytest.mark.parametrize("is_stored", [False, True])
 def test_python_too_is_told_once_that_code_is_being_compiled(is_stored, caplog):
     compiled = Compilation(is_stored)
     run = entry.CompiledEntry(lambda digest: compiled, entry.__name__, 0)
