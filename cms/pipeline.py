@@ -7,7 +7,8 @@
 (5) families      one factorisation of K, for constraint and vibration modes: cms/modes/families
 (6) mode set      columns over the dofs of the body: cms/modes/mode_sets
 (7) unit states   static states of unit loads: cms/reduction/geometric_stiffness/unit_states.py
-(8) reduce        independent orthonormal basis in a body frame, moments, stress: cms/reduction/reduction.py
+(8) reduce        independent orthonormal basis in a body frame, moments, stress, error estimates:
+                  cms/reduction/reduction.py
 (9) write         the modal file, by `cms.write`: cms/body/modal_file/file.py
 """
 
@@ -100,7 +101,7 @@ def reduce_job(
         if plan.needs_states(len(modes.labels)):
             with stages("static states"):
                 states = states_of_job(job, families)  # (7)
-        if job.recovery:  # the static part of recovery rows needs the factorisation
+        if job.recovery or plan.estimates is not False:  # static parts and error estimates need the factorisation
             return reduced(job, plan, families, modes, states, stages)  # (8)
     return reduced(job, plan, body, modes, states, stages)  # (8), with the memory of the factorisation free
 
@@ -196,6 +197,7 @@ def reduced(
             quadratic=bool(job.reduction.quadratic_modes),
             geometric=False if states is None else states,
             recovery=requests_of(job.recovery) if job.recovery else (),
+            errors=plan.estimates,
         )
     left_out = plan.left_out(len(modes.labels)) if states is None else ""
     return replace(made, provenance={**made.provenance, "geometric stiffness": left_out}) if left_out else made
@@ -216,6 +218,7 @@ class Plan:
     is_optional: bool
     solver: Solver | None = None  #: solver for the factorisation; None: the fastest installed one
     to_disk: bool = False  #: whether the columns are stored on disk
+    estimates: bool | None = None  #: whether errors are estimated; None: if the mode set has a factorisation
 
     @classmethod
     def of(cls, job: Job, body: FEBody, solver: Solver, budget: float | None) -> "Plan":
@@ -232,7 +235,8 @@ class Plan:
         from cms.modes.families.cost import require_room_for_stiffness, stiffness_words
         from cms.reduction.geometric_stiffness.unit_states import require_geometric_stiffness
 
-        plan = replace(cls.of_stiffness(job, body), solver=solver)
+        estimates = job.reduction.error_estimates if budget is None else False
+        plan = replace(cls.of_stiffness(job, body), solver=solver, estimates=estimates)
         n_columns = min(expected_columns(job, body), body.n_dof)  # the mode set refuses a job with more modes
         words = plan.left_out(n_columns)
         if plan.is_requested:
@@ -288,6 +292,10 @@ def budget_of(job: Job, solver: str | Solver | None, memory: str | float | None)
     if job.reduction.set == "multilevel":
         raise MemoryBudgetError(
             f"memory = {allowed}: the tree of the set multilevel is not held to it; take craig-bampton, or no memory"
+        )
+    if job.reduction.error_estimates:
+        raise MemoryBudgetError(
+            f"memory = {allowed}: the memory of error estimates is not planned; remove error_estimates, or memory"
         )
     return budget
 

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
+from cms.body.error_estimates import ErrorEstimates
 from cms.body.geometric_stiffness import GeometricStiffness
 from cms.body.invariants import Moments, NodalSums
 from cms.body.kept_points import KeptPoints
@@ -159,6 +160,8 @@ class ReducedBody(Tabular):
         Kept nodes that have rotations; None: there are none.
     recovery
         Recovery matrices by name.
+    errors
+        Estimated errors relative to the finite element model; None: not estimated.
     """
 
     name: str
@@ -188,6 +191,7 @@ class ReducedBody(Tabular):
     numbering: Numbering = field(default_factory=Numbering)
     kept: KeptPoints | None = None
     recovery: Mapping[str, RecoveryTable] = field(default_factory=dict)
+    errors: ErrorEstimates | None = None
 
     def __post_init__(self) -> None:
         where = f"reduced body {self.name!r}"

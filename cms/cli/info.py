@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 __all__ = ["info_command", "info_record", "print_body"]
 
+ROUNDING = 1e-9  #: relative error, below which the output says "exact"
 MOST_SETS = 20  #: largest number of sets in the output
 
 
@@ -84,8 +85,7 @@ def print_body(body: "ReducedBody", *, everything: bool = False, has_warned: boo
             for mode in record["modes"]
         ],
     )
-    free = ", ".join(hertz(f) for f in record["free_frequencies_hz"])
-    say(f"{'Frequencies as held' if body.is_held else 'Free-free frequencies'} [Hz]: {free or 'none'}\n")
+    print_free_frequencies(record)
     if selected := record["provenance"].get("mode set selected"):
         say(f"Selected: {selected}\n")
     if left_out := record["provenance"].get("geometric stiffness"):
@@ -124,6 +124,47 @@ def print_body(body: "ReducedBody", *, everything: bool = False, has_warned: boo
         )
     if everything:
         print_table("Provenance", ("", ""), list(record["provenance"].items()))
+
+
+def print_free_frequencies(record: Any) -> None:
+    """Print the frequencies of the free body, with their estimated errors if these are known."""
+    title = "Frequencies as held" if record["is_held"] else "Free-free frequencies"
+    frequencies, errors = [hertz(f) for f in record["free_frequencies_hz"]], record["errors"]
+    if errors is None:
+        say(f"{title} [Hz]: {', '.join(frequencies) or 'none'}\n")
+        return
+    n = len(errors["frequencies_hz"])
+    print_table(
+        f"{title}, and their estimated errors by the reduction",
+        ("mode>", "Hz>", "error>", "at most>", "shape>"),
+        [
+            (str(k + 1), frequencies[k], *(error_percent(errors[key][k]) for key in ("frequency", "distance", "shape")))
+            for k in range(n)
+        ],
+    )
+    say(
+        "error: an estimate, and the true error is not smaller; at most: some exact frequency is so near; shape: in "
+        "the norm of strain energy"
+    )
+    if len(frequencies) > n:
+        say(f"not judged [Hz]: {', '.join(frequencies[n:])}")
+    for words, labels, values in (
+        ("unit loads at the interfaces", errors["interface_loads"], errors["interface"]),
+        ("rigid-body accelerations with fixed interfaces", None, errors["inertia"]),
+    ):
+        known = [(value, k) for k, value in enumerate(values) if value is not None]
+        if known:
+            worst, k = max(known)
+            at = "" if labels is None or not worst else f", of {labels[k]!r}"
+            say(f"static responses to {words}: {'exact' if not worst else 'error up to ' + error_percent(worst) + at}")
+    say("")
+
+
+def error_percent(value: float | None) -> str:
+    """Return a relative error in percent with two digits; "exact" if it is rounding, "" if it is not known."""
+    if value is None:
+        return ""
+    return "exact" if value < ROUNDING else f"{100 * value:.2g} %"
 
 
 def stiffening_words(record: Any) -> str:

@@ -1,6 +1,7 @@
 """`cms reduce`: one job becomes one modal file, or many jobs many."""
 
 import os
+import re
 import signal
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -54,6 +55,31 @@ def with_workers(job: "Job", workers: str) -> "Job":
     from fe_models.foundation.tasks.workers import checked_workers
 
     reduction = job.reduction.model_copy(update={"workers": checked_workers(workers)})
+    return job.model_copy(update={"reduction": reduction})
+
+
+def with_error(job: "Job", error: float | None, up_to: str | None) -> "Job":
+    """Return the job with the fewest modes that meet an estimated error up to a frequency.
+
+    Raises
+    ------
+    JobError
+        If one of both is missing, the frequency cannot be read, or the mode set has no cutoff.
+    """
+    from cms.jobs.reduction_table import AUTO, ReductionSection
+    from fe_models.foundation.toml_file import validated
+
+    if error is None and up_to is None:
+        return job
+    if error is None or up_to is None:
+        raise JobError("--up-to needs --error" if error is None else "--error needs --up-to")
+    found = re.fullmatch(r"\s*([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(k?Hz)?\s*", up_to)
+    if found is None:
+        raise JobError(f"--up-to {up_to}: expected a frequency such as 500Hz or 2kHz")
+    highest = float(found[1]) * (1000.0 if found[2] == "kHz" else 1.0)
+    asked = {"n_modes": AUTO, "cutoff": None, "error": error, "band": [0.0, highest], "measure": "estimate"}
+    tables = {**job.reduction.model_dump(exclude_unset=True), **asked}
+    reduction = validated(ReductionSection, tables, Path("cms reduce --error --up-to"), JobError)
     return job.model_copy(update={"reduction": reduction})
 
 
@@ -136,6 +162,13 @@ def reduce_command(
     workers: Workers = None,
     solver: Solver = None,
     memory: Memory = None,
+    error: Annotated[
+        float | None,
+        typer.Option("--error", help="With --up-to: the fewest modes with this estimated error of the frequencies."),
+    ] = None,
+    up_to: Annotated[
+        str | None, typer.Option("--up-to", help="Highest frequency of interest, such as 500Hz or 2kHz.")
+    ] = None,
     set_values: SetValues = [],  # noqa: B006
 ) -> None:
     """Reduce finite element bodies to modal files.
@@ -147,6 +180,8 @@ def reduce_command(
     Example: cms reduce rod.toml -o rod.h5
 
     Example: cms reduce rod.toml --set length=0.4 -o rod400.h5
+
+    Example: cms reduce rod.toml --error 1e-3 --up-to 500Hz
 
     Example: cms reduce jobs/*.toml --workers 4
 
@@ -178,6 +213,10 @@ def reduce_command(
         read, workers = with_workers(read, workers), None
     if memory is not None and (read is None or workers is not None):
         raise JobError('--memory: belongs to one job; several have memory = "8GB" in their tables [reduction]')
+    if (error is not None or up_to is not None) and (read is None or workers is not None):
+        raise JobError("--error, --up-to: belong to one job without --workers")
+    if read is not None:
+        read = with_error(read, error, up_to)
     if set_values and (read is None or workers is not None):
         raise JobError("--set: belongs to one job without --workers")
     if read is None or workers is not None:

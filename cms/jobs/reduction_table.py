@@ -44,7 +44,7 @@ __all__ = [
 
 FRAMES = ("nodal", "tisserand", "buckens")
 #: names of `cms.assessment.compare.mode_selection`, whose import would slow down every command
-MEASURE_NAMES = ("frequency", "frf")
+MEASURE_NAMES = ("frequency", "frf", "estimate")
 SET_OPTIONS = (
     "n_modes", "cutoff", "verify", "free", "loads", "neighbours", "n_blocks", "shifts", "tolerance", "band",
     "load_cases", "damping_ratio", "n_rich", "functions", "n_axial", "n_bending", "n_torsion", "axis", "point",
@@ -302,6 +302,11 @@ class ReductionSection(Table):
     )
     quadratic_modes: bool | None = Field(
         None, description="true or false: whether to add the displacement of second order of the kept nodes"
+    )
+    error_estimates: bool | None = Field(
+        None,
+        description="true or false: whether to estimate the errors of frequencies, shapes and static responses; "
+        "default: where the set has a factorisation, and no memory is given",
     )
 
     @model_validator(mode="after")

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from cms.body.error_estimates import ErrorEstimates
 from cms.body.invariants import NEGATIVITY, Moments, NodalSums, moments_from_gram
 from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface, unit_findings
 from cms.errors import ModeSetError
@@ -17,11 +18,12 @@ from cms.modes.families.cost import (
     left_out_words,
     require_room_for_stiffness,
 )
-from cms.modes.families.families import Families, body_of
+from cms.modes.families.families import Families, body_of, families_of
 from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.damping import Damping, modal_damping
 from cms.reduction.basis.finishing import FinishedBasis, finish
 from cms.reduction.basis.frames import Frame, FrameCondition, HeldFrame, TisserandFrame, frame_condition
+from cms.reduction.basis.free_basis import basis_of_finished
 from cms.reduction.basis.matrix_moments import gram_from_matrices
 from cms.reduction.basis.node_results import (
     kept_points,
@@ -33,6 +35,7 @@ from cms.reduction.basis.node_results import (
     weighted_rigid_modes,
 )
 from cms.reduction.basis.strain_damping import StrainDamping
+from cms.reduction.error_estimates import error_estimates
 from cms.reduction.geometric_stiffness.geometric_reduction import stiffness_of_states
 from cms.reduction.geometric_stiffness.quadratic_modes import quadratic_modes
 from cms.reduction.geometric_stiffness.unit_states import (
@@ -74,6 +77,7 @@ def reduce(
     quadratic: bool = False,
     keep: Sequence[Any] = (),
     recovery: RecoveryRequest | Iterable[RecoveryRequest] = (),
+    errors: bool | None = None,
 ) -> ReducedBody:
     """Reduce a body to the span of a mode set.
 
@@ -108,6 +112,10 @@ def reduce(
     recovery
         Tables of recovery rows to add (`ReducedBody.recovery`): motions, stress, forces in elements and at interfaces,
         with their static part, which needs the factorisation.
+    errors
+        Whether to estimate the errors of frequencies, shapes and static responses (`ReducedBody.errors`), which needs
+        the factorisation and about as many solutions as the set has vibration modes. Default: True if `source` is
+        `Families` that have been factorised.
 
     Raises
     ------
@@ -159,8 +167,11 @@ def reduce(
     reduced = assembled(keeping, modes, finished, condition, kept=kept, moments=moments, damping=damping)
     for _, text in unit_findings(reduced):
         log.warning("body %r: %s", body.name, text)
+    if errors is None:
+        errors = isinstance(source, Families) and source.has_factor
     return replace(
         reduced,
+        errors=errors_of(source, modes, finished) if errors else None,
         provenance={**reduced.provenance, **{key: words for key, words in told.items() if words}},
         recovery=recovery_of_model(source, in_memory(finished.Phi), condition, reduced, recovery) if recovery else {},
         stress=nodal_stress_modes(body, finished.Phi, kept, condition.frame.axes) if stress else None,
@@ -170,6 +181,12 @@ def reduce(
         geometric=None if states is None else stiffness_of_states(body, finished.Phi, states),
         quadratic=quadratic_modes(source, in_memory(finished.Phi), condition, kept) if quadratic else None,
     )
+
+
+def errors_of(source: FEBody | Families, modes: ModeSet, finished: FinishedBasis) -> ErrorEstimates:
+    """Return the estimated errors, from a factorisation of its own if the source has none."""
+    with families_of(source) as families:
+        return error_estimates(families, modes, basis_of_finished(families, finished))
 
 
 def assembled(

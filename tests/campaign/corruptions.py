@@ -419,6 +419,8 @@ CORRUPTIONS: dict[str, tuple[str, Corruption]] = {
     "nodal sums: first moment": ("nodal-sums", moved_sums),
     "nodal sums of the modes": ("nodal-sums", sums_of_modes("U1")),
     "nodal sums of turning modes": ("nodal-sums", sums_of_modes("U2")),
+    "errors of the frequencies a tenth": ("error-estimates", of("errors.frequency", times(0.1))),
+    "errors of the statics none": ("error-estimates", of("errors.inertia", times(0.0))),
     "labels of the modes shuffled": ("sources", exchanged_labels),
     "energy shares shuffled": ("sources", of("energy_shares", shuffled(0))),
     "columns: coordinates of wrong sign": ("sources", of("columns.A", one_mode(1))),

@@ -11,7 +11,7 @@ import scipy.linalg as la
 from cms.assessment.compare.coordinates import Coordinates
 from cms.assessment.compare.free_shapes import Subset
 from cms.assessment.compare.full_model import FullModel
-from cms.assessment.quality.of_reduction.completeness import NO_ENERGY, StaticCompleteness, completeness_records
+from cms.assessment.quality.of_reduction.completeness import StaticCompleteness, completeness_records
 from cms.assessment.quality.of_reduction.conditioning import conditioning_record, dropped_record
 from cms.assessment.quality.of_reduction.deformation import (
     DeformationError,
@@ -25,8 +25,9 @@ from cms.assessment.quality.of_reduction.frf import ResponseComparison, compare_
 from cms.assessment.quality.of_reduction.held_mass import answered_statically
 from cms.assessment.quality.of_reduction.residuals import ResidualBounds, residual_record
 from cms.assessment.quality.record import QualityRecord, information, judge
-from cms.assessment.quality.reference.free_basis import FreeBasis
 from cms.assessment.quality.reference.port_model import FrequencyResponse, PortModel, modal_response
+from cms.reduction.basis.free_basis import FreeBasis
+from cms.reduction.error_estimates import NO_ENERGY
 from fe_models.foundation.arrays import Array
 
 __all__ = ["Reference", "drawn_entry", "judge_subset"]

@@ -6,11 +6,11 @@ import numpy as np
 import scipy.linalg as la
 
 from cms.assessment.compare.coordinates import Coordinates
-from cms.assessment.quality.reference.free_basis import FreeBasis
 from cms.errors import ModeSetError
 from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
 from cms.linear_algebra.independent import RANK_TOLERANCE
 from cms.reduction.basis.finishing import elastic_directions
+from cms.reduction.basis.free_basis import FreeBasis
 from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["Subset", "independent_subset", "judged_subset"]

@@ -3,59 +3,32 @@
 import inspect
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
-from types import MappingProxyType
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
 
 from cms.assessment.compare.coordinates import ReferenceBasis
+from cms.assessment.compare.estimated_selection import select_by_estimate
 from cms.assessment.compare.free_shapes import judged_subset
+from cms.assessment.compare.selection import FEWEST, MOST, Selection, Trial
 from cms.assessment.compare.subsets import SUBSETS
 from cms.assessment.quality.of_reduction.frf import DAMPING, LOWEST, compare_responses, frequency_grid
-from cms.assessment.quality.reference.free_basis import FreeBasis
 from cms.assessment.quality.reference.full_reference import FullReference
 from cms.assessment.quality.reference.port_model import PortModel, modal_response
 from cms.errors import ModeSetError
 from cms.modes.families.families import Families, families_of
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets import MODE_SETS
+from cms.reduction.basis.free_basis import FreeBasis
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.presentation import presented
 from fe_models.foundation.tall.columns import in_memory
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["MEASURES", "Selection", "Trial", "select_modes"]
+__all__ = ["MEASURES", "Selection", "Trial", "check_request", "select_modes"]
 
-FEWEST = 8  #: number of modes of the first set that is computed
-MOST = 300  #: default number of modes above which the search fails
-
-
-@dataclass(frozen=True)
-class Trial:
-    """Result of a set with one number of modes."""
-
-    n_modes: int
-    n_columns: int  #: number of columns of the mode set, including static columns
-    error: float  #: error in the chosen measure; inf if a mode of the band is missing, or the set could not be computed
-    where: str  #: place of the largest error, for messages
-
-
-@presented
-@dataclass(frozen=True, eq=False)
-class Selection:
-    """Chosen mode set and the reason for the choice."""
-
-    modes: ModeSet
-    n_modes: int
-    error: float  #: error with the chosen number of modes
-    history: tuple[Trial, ...]  #: results for all numbers of modes that were tried, ascending
-    sentence: str  #: the choice and its reason in words
-    options: Mapping[str, str] = field(default_factory=dict)  #: options that the caller gave
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "options", MappingProxyType(dict(self.options)))
+ESTIMATE = "estimate"  #: the measure that needs no solution of the full model
 
 
 def select_modes(
@@ -90,6 +63,8 @@ def select_modes(
         "frequency": largest relative error of the elastic free-free frequencies in the band.
         "frf": root mean square, over the logarithm of frequency, of the relative error of the receptance of all
         interfaces, 1 % modal damping (`cms.assessment.quality.of_reduction.frf`).
+        "estimate": twice the estimated error of these frequencies (`cms.reduction.error_estimates`), with a count of
+        the exact modes, without a solution of the full model.
     options
         Options of the set other than the number of modes.
     added
@@ -103,10 +78,16 @@ def select_modes(
         If numbers or names are wrong, the band holds no mode, or no number of modes meets the error. In the last case
         the message contains the best result.
     """
-    _check(set, error, band, measure)
+    check_request(set, error, band)
+    if measure not in (*MEASURES, ESTIMATE):
+        raise ModeSetError(f"select_modes: unknown measure {quoted(measure)}{nearest(measure, [*MEASURES, ESTIMATE])}")
     options = dict(options or {})
     with ExitStack() as stack:
         families = stack.enter_context(families_of(body))
+        if measure == ESTIMATE:
+            return select_by_estimate(
+                families, set=set, error=error, band=band, options=options, added=added, most=most
+            )  # fmt: skip
         reference = stack.enter_context(FullReference(families, band=band[1]))
         judge = MEASURES[measure](reference, band)
         make = _Maker(set, families, options, added, most)
@@ -283,7 +264,8 @@ def _sentence(
     return text
 
 
-def _check(name: str, error: float, band: tuple[float, float], measure: str) -> None:
+def check_request(name: str, error: float, band: tuple[float, float]) -> None:
+    """Raise `ModeSetError` if the name of the set, the error or the band is not valid."""
     if name not in MODE_SETS:
         raise ModeSetError(f"select_modes: unknown mode set {quoted(name)}{nearest(name, MODE_SETS)}")
     if "n_modes" not in inspect.signature(MODE_SETS[name]).parameters:
@@ -292,5 +274,3 @@ def _check(name: str, error: float, band: tuple[float, float], measure: str) -> 
         raise ModeSetError(f"select_modes: error = {error}; expected a number between 0 and 1, such as 1e-3")
     if len(band) != 2 or not 0 <= band[0] < band[1] < np.inf:
         raise ModeSetError(f"select_modes: band = {tuple(band)}; expected two frequencies (from, to), 0 <= from < to")
-    if measure not in MEASURES:
-        raise ModeSetError(f"select_modes: unknown measure {quoted(measure)}{nearest(measure, MEASURES)}")

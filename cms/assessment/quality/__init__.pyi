@@ -1,3 +1,5 @@
+from ...reduction.basis.free_basis import FreeBasis as FreeBasis
+from ...reduction.basis.free_basis import free_basis as free_basis
 from .errors import QualityError as QualityError
 from .limits import LIMITS as LIMITS
 from .limits import Limit as Limit
@@ -28,8 +30,6 @@ from .plots import plot_frf as plot_frf
 from .record import QualityRecord as QualityRecord
 from .record import has_failed as has_failed
 from .record import worst as worst
-from .reference.free_basis import FreeBasis as FreeBasis
-from .reference.free_basis import free_basis as free_basis
 from .reference.full_reference import FullReference as FullReference
 from .reference.full_reference import usable_band as usable_band
 from .reference.port_model import FrequencyResponse as FrequencyResponse

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from cms.body.error_estimates import ErrorEstimates
 from cms.body.invariants import Moments
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array, IntArray
@@ -92,6 +93,7 @@ def body_record(body: ReducedBody) -> dict[str, Any]:
         },
         "geometric_stiffness": body.geometric is not None,
         "quadratic_modes": body.quadratic is not None,
+        "errors": None if body.errors is None else errors_record(body, body.errors),
         "recovery": [
             {
                 "name": table.name,
@@ -106,6 +108,22 @@ def body_record(body: ReducedBody) -> dict[str, Any]:
         "numbering": numbering_record(body),
         "surface_triangles": len(body.surface),
         "provenance": dict(body.provenance),
+    }
+
+
+def errors_record(body: ReducedBody, errors: ErrorEstimates) -> dict[str, Any]:
+    """Return the estimated errors as plain types; what is not finite becomes None."""
+    return {
+        "frequencies_hz": in_hertz(body, errors.frequencies).tolist(),
+        "frequency": errors.frequency.tolist(),
+        "bound": errors.bound.tolist(),
+        "distance": [_finite(x) for x in errors.distance],
+        "shape": errors.shape.tolist(),
+        "interface_loads": list(errors.interface_loads),
+        "interface": [_finite(error) for error in errors.interface],
+        "inertia": [_finite(error) for error in errors.inertia],
+        "method": errors.method,
+        "date": errors.date,
     }
 
 

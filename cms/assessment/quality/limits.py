@@ -185,6 +185,10 @@ LIMITS: dict[str, Limit] = {
         "sums over the nodes, for a Buckens frame", 1e-6, 1e-4,
         "a Buckens frame made of this file would be wrong; reduce again",
     ),
+    "error-estimates": Limit(
+        "estimated errors in the file", 0.1, 0.5,
+        "the file states errors that are not those of its modes; reduce again",
+    ),
     "sources": Limit(
         "labels, shares and columns of the mode set", 1e-5, 1e-3,
         "labels and columns are not those of the modes; reduce again",

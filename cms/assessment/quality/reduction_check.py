@@ -22,12 +22,12 @@ from cms.assessment.quality.of_reduction.interface_stiffening import (
 from cms.assessment.quality.of_reduction.mass_properties import check_grounding, check_mass_properties
 from cms.assessment.quality.of_reduction.residuals import residual_bounds, residual_record
 from cms.assessment.quality.record import QualityRecord, information, judge
-from cms.assessment.quality.reference.free_basis import free_basis
 from cms.assessment.quality.reference.full_reference import FullReference, usable_band
 from cms.assessment.quality.reference.port_model import port_model
 from cms.assessment.quality.reference.transient import Snapshots
 from cms.body.reduced_body import ReducedBody
 from cms.modes.mode_set import ModeSet
+from cms.reduction.basis.free_basis import free_basis
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.tall.columns import of_this_process
 

@@ -107,7 +107,7 @@ def items_of(body: ReducedBody) -> dict[str, tuple[Any, ...]]:
         "/units": (body.units,), "/frame": (body.frame,), "/modes": (body,), "/nodes": (body,), "/surface": (body,),
         "/interfaces/<i>": body.interfaces, "/load_cases/<i>": body.load_cases,
     }  # fmt: skip
-    parts = {"/kept": body.kept, "/columns": body.columns, "/nodal_sums": body.nodal_sums,
+    parts = {"/kept": body.kept, "/columns": body.columns, "/errors": body.errors, "/nodal_sums": body.nodal_sums,
              "/stress/points": body.point_stress, "/quadratic": None if body.quadratic is None else body}  # fmt: skip
     several = {"/sets/<i>": body.numbering.sets, "/recovery/<i>": tuple(body.recovery.values())}
     return (
@@ -150,6 +150,7 @@ def body_of(content: Content) -> ReducedBody:
         provenance={name: str(value) for name, value in content.attributes.get("/provenance", {}).items()},
         columns=part("/columns") if has("/columns") else None,
         nodal_sums=part("/nodal_sums") if has("/nodal_sums") else None,
+        errors=part("/errors") if has("/errors") else None,
         load_cases=items_in(contents, "/load_cases"),
         stress=contents.value("/stress/nodal") if has("/stress", "has_nodal") else None,
         point_stress=part("/stress/points") if has("/stress", "has_points") else None,

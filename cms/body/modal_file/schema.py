@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from cms.body.error_estimates import ErrorEstimates
 from cms.body.invariants import NodalSums
 from cms.body.kept_points import KeptPoints
 from cms.body.modal_file.contents import Content, Dataset
@@ -144,6 +145,20 @@ ENTRIES = {
         "(n_columns, n_q)",
         "forces of the modes on the columns, scaled; A F: part of a column in a mode's energy", RATE,
     ),
+    "/errors/frequencies": Entry(
+        "(n_judged,)", "free frequencies of which the errors were estimated, ascending, cycles per time unit", RATE,
+    ),
+    "/errors/frequency": Entry("(n_judged,)", "estimate of f_reduced / f - 1; the exact error is not smaller"),
+    "/errors/bound": Entry("(n_judged,)", "rigorous bound of |(f_reduced / f)^2 - 1| for some exact frequency f"),
+    "/errors/shape": Entry(
+        "(n_judged,)", "estimated error of the shape in the norm of strain energy, relative to the shape",
+    ),
+    "/errors/interface_loads": Entry("(n_loads,) text", "one per unit load at the interfaces, in words"),
+    "/errors/interface": Entry(
+        "(n_loads,)", "error of the static response to each of these loads in the norm of strain energy; NaN: the load "
+        "does not deform the body",
+    ),
+    "/errors/inertia": Entry("(n_r,)", "the same for each rigid-body acceleration with fixed interfaces"),
     "/nodal_sums/w": Entry("()", "sum over the nodes of their weight w, the volume each stands for", VOLUME),
     "/nodal_sums/S": Entry("(3,)", "sum of w c_a", Dimensions(0, 4)),
     "/nodal_sums/R": Entry("(3, 3)", "sum of w c_a c_b", Dimensions(0, 5)),
@@ -323,6 +338,7 @@ GROUPS = {
     "/sets/<i>": Group(NamedSet, NAME_AND_KIND | {"size": int}),
     "/kept": Group(KeptPoints),
     "/columns": Group(SourceColumns),
+    "/errors": Group(ErrorEstimates, {"method": str, "date": str}, if_any=("interface_loads",)),
     "/nodal_sums": Group(NodalSums, {"is_volume": bool}),
     "/quadratic": Group(ReducedBody, names={"g": "quadratic"}),
     "/stress/points": Group(PointStress, names={"position": "positions"}),

@@ -123,6 +123,11 @@ class Families(AbstractContextManager["Families"]):
         self._fixed = fix_interfaces(self.body, self.interior_r, solver=self.solver)
         return self._fixed
 
+    @property
+    def has_factor(self) -> bool:
+        """Whether the interior stiffness of a body in this process has been factorised, and the factor is not freed."""
+        return self._is_open and self._fixed is not None and self.body.layout is None
+
     def adopt(self, fixed: FixedInterfaceBody) -> None:
         """Use an existing interior factorisation, unless there is one here; it is freed with these families."""
         if self._fixed is None:

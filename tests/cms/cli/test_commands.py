@@ -109,6 +109,37 @@ def test_file_line_and_memory_line_agree_bit_for_bit(folder):
     assert again.moments.S_kl.tobytes() == body.moments.S_kl.tobytes()
 
 
+def test_reduce_takes_the_fewest_modes_for_an_error(folder):
+    """And states the errors of what it made; the table of the job has a number of modes, which gives way."""
+    result = run("reduce", folder / "bar.toml", "-o", folder / "few.h5", "--error", "1e-2", "--up-to", "20kHz")
+    assert result.exit_code == 0, result.output
+    told = " ".join(result.stdout.split())
+    assert (
+        "modes are the fewest with an estimated error of the free frequencies of at most 0.01 from 0 to 20000 Hz"
+        in told
+    )
+    assert "estimated errors by the reduction" in told
+    made = read(folder / "few.h5")
+    assert 0 < made.errors.frequency[made.errors.frequencies < 20e3].max() <= 0.005
+    record = json.loads(run("info", folder / "few.h5", "--json").stdout)["errors"]
+    assert_allclose(record["frequency"], made.errors.frequency)
+    assert record["method"] == made.errors.method
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--error", "1e-3"], "--error needs --up-to"),
+        (["--up-to", "2kHz"], "--up-to needs --error"),
+        (["--error", "1e-3", "--up-to", "30rpm"], "--up-to 30rpm: expected a frequency such as 500Hz or 2kHz"),
+        (["--error", "2", "--up-to", "2kHz"], "error = 2.0: expected a number between 0 and 1"),
+    ],
+)
+def test_an_error_that_cannot_be_met_is_refused(folder, words, message):
+    assert_refused(run("reduce", folder / "bar.toml", "-o", folder / "x.h5", *words), message)
+    assert not (folder / "x.h5").exists()
+
+
 def test_reduce_warns_of_a_body_too_large_once_and_info_again(folder, caplog):
     """The bar is 100 mm long; its numbers read as metres make a body of 101 m of steel."""
     text = JOB.replace("mm-t-s", "m-kg-s").replace("210000", "2.1e11").replace("7.85e-9", "7850.0")

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from pydantic import ValidationError
 
-from cms.assessment.compare.mode_selection import MEASURES, select_modes
+from cms.assessment.compare.mode_selection import ESTIMATE, MEASURES, select_modes
 from cms.cli.info import print_body
 from cms.jobs.body_of_job import coupled_body
 from cms.jobs.job import Job, ReductionSection
@@ -145,4 +145,4 @@ def test_options_that_do_not_fit_are_refused(keys, words):
 
 
 def test_the_measures_of_the_job_are_those_of_the_search():
-    assert tuple(MEASURES) == MEASURE_NAMES
+    assert (*MEASURES, ESTIMATE) == MEASURE_NAMES

@@ -5,19 +5,18 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cms.assessment.quality.record import QualityRecord, information, judge
-from cms.assessment.quality.reference.free_basis import FreeBasis
 from cms.assessment.quality.reference.full_reference import FullReference
 from cms.modes.families.families import Families
-from fe_models.body.fe_body import FEBody
+from cms.reduction.basis.free_basis import FreeBasis
+from cms.reduction.error_estimates import energy_error
 from fe_models.body.load_cases import load_columns
 from fe_models.foundation.arrays import Array, frozen
 
 __all__ = [
-    "StaticCompleteness", "completeness_records", "energy_error", "load_case_responses", "static_completeness",
+    "StaticCompleteness", "completeness_records", "load_case_responses", "static_completeness",
 ]  # fmt: skip
 
 NO_LOAD = 1e-10  #: relative difference of a load and the inertia forces that balance it, below which it is rounding
-NO_ENERGY = 1e-24  #: strain energy of a response relative to the largest of its kind, below which it is zero
 ACCELERATIONS = ("ax", "ay", "az", "alpha x", "alpha y", "alpha z")
 
 
@@ -37,22 +36,6 @@ class StaticCompleteness:
         object.__setattr__(self, "interface", frozen(self.interface))
         object.__setattr__(self, "inertia", frozen(self.inertia))
         object.__setattr__(self, "load_case", frozen(self.load_case))
-
-
-def energy_error(body: FEBody, basis: FreeBasis, U: Array) -> Array:
-    """Return the relative energy error of approximating columns U by rigid motion and modes, (k,); NaN: no energy.
-
-    With c = Phiᵀ K u / omega² the energy of the error e = u - Phi c is computed, not the difference of two energies.
-    Rigid motion is subtracted first: it has no energy, but its rounding errors have.
-    """
-    U = U - basis.N @ (basis.N.T @ (body.M @ U))
-    K_U = body.K @ U
-    energy = np.einsum("nk,nk->k", U, K_U)
-    c = (basis.Phi.T @ K_U) / basis.omega2[:, None]
-    E = U - basis.Phi @ c
-    error = np.einsum("nk,nk->k", E, body.K @ E)
-    has_energy = energy > NO_ENERGY * energy.max(initial=0.0)
-    return np.sqrt(np.maximum(error, 0.0) / np.where(has_energy, energy, np.nan))
 
 
 def static_completeness(reference: FullReference, basis: FreeBasis) -> StaticCompleteness:

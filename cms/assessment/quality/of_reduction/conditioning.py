@@ -3,9 +3,9 @@
 import numpy as np
 
 from cms.assessment.quality.record import QualityRecord, judge
-from cms.assessment.quality.reference.free_basis import FreeBasis
 from cms.linear_algebra.independent import independent_columns
 from cms.modes.mode_set import ModeSet
+from cms.reduction.basis.free_basis import FreeBasis
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.tall.columns import inner
 

@@ -19,7 +19,6 @@ from cms.assessment.quality.of_body.identities import mode_size
 from cms.assessment.quality.of_reduction.fields import Compared, apart, same
 from cms.assessment.quality.of_reduction.full_shapes import FullShapes, finished_in, named_frame
 from cms.assessment.quality.record import QualityRecord, information, judge
-from cms.assessment.quality.reference.free_basis import FreeBasis
 from cms.body.geometric_stiffness import UNIT_LOADS
 from cms.body.invariants import known_P, known_S_kl
 from cms.body.recovery_table import N_RIGID, RecoveryTable
@@ -32,8 +31,10 @@ from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.damping import Damping, damping_of_words, modal_damping
 from cms.reduction.basis.finishing import SUSPECT_ENERGY, FinishedBasis
 from cms.reduction.basis.frames import Frame, FrameCondition, HeldFrame, frame_condition
+from cms.reduction.basis.free_basis import FreeBasis
 from cms.reduction.basis.node_results import nodal_stress_modes, point_stress_modes
 from cms.reduction.basis.strain_damping import StrainDamping
+from cms.reduction.error_estimates import STATIC_ROUNDING, error_estimates
 from cms.reduction.geometric_stiffness.geometric_reduction import stiffness_of_states
 from cms.reduction.geometric_stiffness.quadratic_modes import force_stiffness
 from cms.reduction.geometric_stiffness.unit_states import has_geometric_stiffness, unit_states
@@ -53,6 +54,7 @@ FEW = 24  #: largest number of modes that are compared individually
 PROBES = 12  #: number of random combinations of modes, if there are more modes
 FEW_NODES = 20  #: largest number of nodes whose quadratic modes are compared individually
 NODE_PROBES = 8  #: number of random combinations of nodes, if there are more nodes
+ROUNDING_OF_ERRORS = 1e-6  #: estimated error of a mode that is rounding
 NEGLIGIBLE = 1e-3  #: smallest scale of a difference, relative to the largest possible size of the field
 STRESS = (1.0, -1.0, -2.0)  #: dimensions of stress: exponents of mass, length and time
 CONVERTED = "frame converted from"  #: provenance entry of a file that was converted to another frame
@@ -296,6 +298,24 @@ def compare_sums(case: Case) -> Iterator[Compared]:
     scales: dict[str, Array | float] = {"w": w, "S": w * L, "R": w * L**2, "U1": w * size, "U2": w * L * size}
     for name, scale in scales.items():
         yield apart(f"nodal_sums.{name}", getattr(file, name), getattr(expected, name), scale)
+
+
+def compare_errors(case: Case) -> Iterator[Compared]:
+    """Compare the estimated errors of a file that has some; differences below 1e-6 are rounding."""
+    file = case.reduced.errors
+    if file is None:
+        return
+    expected = error_estimates(case.families, case.modes, case.basis)
+    for name in ("method", "interface_loads"):
+        yield same(f"errors.{name}", getattr(file, name), getattr(expected, name))
+    yield same("errors.date", bool(file.date), True)
+    yield apart("errors.frequencies", file.frequencies, expected.frequencies, expected.frequencies, axes="mode")
+    for name in ("frequency", "bound", "shape"):
+        wanted = getattr(expected, name)
+        yield apart(f"errors.{name}", getattr(file, name), wanted, wanted + ROUNDING_OF_ERRORS, axes="mode")
+    for name in ("interface", "inertia"):
+        got, wanted = (np.nan_to_num(getattr(each, name), nan=-1.0) for each in (file, expected))
+        yield apart(f"errors.{name}", got, wanted, np.abs(wanted) + STATIC_ROUNDING, axes="load")
 
 
 # Inertia and damping --------------------------------------------------------------------------------------------------
@@ -650,6 +670,7 @@ CONTENTS: dict[str, Callable[[Case], Iterator[Compared]]] = {
     "kept-rotations": compare_rotations,
     "recovery-rows": compare_recovery,
     "nodal-sums": compare_sums,
+    "error-estimates": compare_errors,
     "sources": compare_sources,
     "origin": compare_origin,
 }

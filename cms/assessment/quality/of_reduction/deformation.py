@@ -14,9 +14,9 @@ import numpy as np
 
 from cms.assessment.quality.errors import QualityError
 from cms.assessment.quality.record import QualityRecord, judge
-from cms.assessment.quality.reference.free_basis import FreeBasis
 from cms.assessment.quality.reference.transient import Snapshots
 from cms.body.reduced_body import ReducedBody
+from cms.reduction.basis.free_basis import FreeBasis
 from fe_models.body.fe_body import FEBody
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.foundation.arrays import Array, frozen

@@ -109,6 +109,15 @@ FIELDS: Mapping[str, str] = {
     "recovery.static": "recovery-rows",
     "recovery.system": "recovery-rows",
     "recovery.truncated": "recovery-rows",
+    "errors.frequencies": "error-estimates",
+    "errors.frequency": "error-estimates",
+    "errors.bound": "error-estimates",
+    "errors.shape": "error-estimates",
+    "errors.interface_loads": "error-estimates",
+    "errors.interface": "error-estimates",
+    "errors.inertia": "error-estimates",
+    "errors.method": "error-estimates",
+    "errors.date": "error-estimates",
 }
 
 

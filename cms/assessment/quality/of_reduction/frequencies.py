@@ -6,8 +6,8 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from cms.assessment.quality.record import QualityRecord, judge
-from cms.assessment.quality.reference.free_basis import FreeBasis
 from cms.assessment.quality.reference.full_reference import FullReference
+from cms.reduction.basis.free_basis import FreeBasis
 from fe_models.foundation.arrays import Array, IntArray, frozen
 
 __all__ = ["FrequencyComparison", "compare_frequencies", "compare_shapes", "frequency_records", "mac"]

@@ -6,9 +6,9 @@ import numpy as np
 
 from cms.assessment.quality.errors import QualityError
 from cms.assessment.quality.record import QualityRecord, judge
-from cms.assessment.quality.reference.free_basis import FreeBasis
 from cms.assessment.quality.reference.full_reference import FullReference
 from cms.assessment.quality.reference.port_model import FrequencyResponse, PortModel, modal_response
+from cms.reduction.basis.free_basis import FreeBasis
 from fe_models.foundation.arrays import Array, frozen
 
 __all__ = [

@@ -6,9 +6,9 @@ import numpy as np
 import scipy.sparse.linalg as sla
 
 from cms.assessment.quality.record import QualityRecord, information, judge
-from cms.assessment.quality.reference.free_basis import FreeBasis
 from cms.assessment.quality.reference.full_reference import FullReference
 from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
+from cms.reduction.basis.free_basis import FreeBasis
 from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.foundation.arrays import Array, frozen
 

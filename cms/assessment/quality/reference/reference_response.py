@@ -15,11 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from cms.assessment.quality.errors import QualityError
-from cms.assessment.quality.reference.free_basis import FreeBasis, ritz_basis
 from cms.assessment.quality.reference.port_model import PortModel
 from cms.assessment.quality.reference.ports import Ports
 from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.modes.families.families import Families
+from cms.reduction.basis.free_basis import FreeBasis, ritz_basis
 from fe_models.foundation.sparse.sparse_product import SymmetricProduct
 
 __all__ = ["RESPONSE_TOLERANCE", "ReferenceResponse", "reference_response"]

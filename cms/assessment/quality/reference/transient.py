@@ -15,11 +15,11 @@ import numpy as np
 import scipy.linalg as la
 
 from cms.assessment.quality.errors import QualityError
-from cms.assessment.quality.reference.free_basis import FreeBasis, ritz_basis
 from cms.assessment.quality.reference.ports import Ports
 from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.modes.families.families import Families
 from cms.modes.families.flexibility import BoundaryConditions, Flexibility
+from cms.reduction.basis.free_basis import FreeBasis, ritz_basis
 from fe_models.body.fe_body import FEBody
 from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.foundation.arrays import Array

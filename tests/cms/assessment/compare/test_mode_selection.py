@@ -10,6 +10,7 @@ from cms.assessment.compare.mode_selection import select_modes
 from cms.assessment.quality.of_reduction.frf import frequency_grid
 from cms.errors import ModeSetError
 from cms.modes.families.families import Families
+from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets import MODE_SETS, craig_bampton
 from cms.modes.mode_sets.extra_columns import with_load_cases
 from cms.reduction.reduction import reduce
@@ -193,3 +194,48 @@ def test_the_chosen_set_is_the_set_itself(body, families):
     direct = craig_bampton(families, n_modes=found.n_modes)
     assert found.modes.labels == direct.labels
     assert_allclose(found.modes.columns, direct.columns, rtol=0, atol=0)
+
+
+@pytest.mark.parametrize("name", ["craig-bampton", "craig-bampton-ir", "rubin", "normal"])
+@pytest.mark.parametrize("error", [1e-2, 1e-4])
+def test_the_estimate_chooses_modes_whose_true_error_is_small_enough(body, full, families, name, error):
+    """As many as the full model would choose for this error, or more: at most as many as for half of it."""
+    chosen = select_modes(families, set=name, error=error, band=BAND, measure="estimate")
+    assert frequency_error(body, full, chosen.modes) <= error
+    least, most = (select_modes(families, set=name, error=each, band=BAND).n_modes for each in (error, error / 2))
+    assert least <= chosen.n_modes <= most
+    assert "as counted" in chosen.sentence
+    assert chosen.modes.options["error"] == f"{error:g}"
+
+
+def test_a_mode_that_the_set_lacks_is_missed_by_the_count(body, families):
+    """Normal modes without the second one: its place is taken by the third, which has no error of its own."""
+
+    def without_the_second(modes):
+        kept = np.arange(len(modes.labels)) != np.flatnonzero(~modes.is_static)[1]
+        labels = tuple(label for label, keep in zip(modes.labels, kept, strict=True) if keep)
+        return ModeSet("normal", modes.columns[:, kept], labels, modes.frequencies[kept])
+
+    asked = {"set": "normal", "error": 1e-3, "band": BAND, "measure": "estimate", "most": 20}
+    assert select_modes(families, **asked).n_modes < 20
+    with pytest.raises(ModeSetError, match=r"does not meet an estimated error of 0.001 .* with up to 20 modes"):
+        select_modes(families, **asked, added=without_the_second)
+
+
+def test_the_estimate_solves_no_full_model(families, monkeypatch):
+    monkeypatch.setattr(Families, "free_modes", lambda *_: pytest.fail("the full model was solved"))
+    select_modes(families, set="craig-bampton", error=1e-3, band=BAND, measure="estimate")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"set": "guyan"}, "has no number of modes to choose"),
+        ({"band": (0.0, 5.0)}, "no elastic free mode of body 'bar' lies below 5 Hz"),
+        ({"measure": "estimates"}, "unknown measure 'estimates'; did you mean 'estimate'"),
+    ],
+)
+def test_what_the_estimate_cannot_choose_is_refused(families, options, message):
+    asked = {"set": "craig-bampton", "error": 1e-3, "band": BAND, "measure": "estimate", **options}
+    with pytest.raises(ModeSetError, match=message):
+        select_modes(families, **asked)

@@ -16,7 +16,6 @@ from cms.assessment.quality.of_reduction.fields import FIELDS, Compared, apart, 
 from cms.assessment.quality.of_reduction.full_shapes import full_shapes, same_body_record
 from cms.assessment.quality.of_reduction.mass_properties import check_mass_properties
 from cms.assessment.quality.reduction_check import check_reduction
-from cms.assessment.quality.reference.free_basis import free_basis
 from cms.assessment.quality.reference.full_reference import FullReference
 from cms.body.reduced_body import ReducedBody
 from cms.reduction.basis.damping import (
@@ -26,6 +25,7 @@ from cms.reduction.basis.damping import (
     RayleighDamping,
     damping_of_words,
 )
+from cms.reduction.basis.free_basis import free_basis
 from cms.reduction.recovery.request import RecoveryRequest, Rows
 from fe_models.body.couplings.couplings import couple
 from fe_models.body.fe_body import Interface
@@ -46,7 +46,8 @@ class Bench:
     def __init__(self, body, modes, options: ReductionOptions, **more: Any) -> None:
         self.body, self.modes, self.options = body, modes, options
         self.reduced = cms.reduce(body, modes, frame=options.frame, damping=options.damping, recovery=options.recovery,
-                                  quadratic=options.quadratic, geometric=bool(options.geometric), **more)  # fmt: skip
+                                  quadratic=options.quadratic, geometric=bool(options.geometric), errors=True,
+                                  **more)  # fmt: skip
         self.reference = FullReference(body, band=2000.0)
         self.basis = free_basis(body, modes, self.reference.families)
 

@@ -13,7 +13,6 @@ from cms.assessment.quality.of_reduction.deformation import (
     nodal_deformation_error,
 )
 from cms.assessment.quality.plots import plot_deformation_error
-from cms.assessment.quality.reference.free_basis import FreeBasis, free_basis
 from cms.assessment.quality.reference.transient import (
     LoadHistory,
     Snapshots,
@@ -27,6 +26,7 @@ from cms.modes.families.families import Families
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets import MODE_SETS, craig_bampton, guyan
 from cms.reduction.basis.frames import NodalFrame, TisserandFrame
+from cms.reduction.basis.free_basis import FreeBasis, free_basis
 from cms.reduction.reduction import reduce
 from fe_models.body.couplings.couplings import couple
 from fe_models.body.rigid_motion import rigid_motion_of_dofs

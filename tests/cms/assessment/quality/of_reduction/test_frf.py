@@ -13,7 +13,6 @@ from cms.assessment.quality.of_reduction.frf import (
     response_comparison,
 )
 from cms.assessment.quality.plots import frf_figure, plot_frf
-from cms.assessment.quality.reference.free_basis import free_basis
 from cms.assessment.quality.reference.full_reference import FullReference
 from cms.assessment.quality.reference.port_model import file_resonances, frf, modal_response, port_model
 from cms.assessment.quality.reference.ports import Ports
@@ -23,6 +22,7 @@ from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets import MODE_SETS, craig_bampton
 from cms.reduction.basis.damping import ModalDamping
 from cms.reduction.basis.frames import NodalFrame, TisserandFrame
+from cms.reduction.basis.free_basis import free_basis
 from cms.reduction.reduction import reduce
 from fe_models.body.couplings.couplings import couple
 from fe_models.body.fe_body import Interface

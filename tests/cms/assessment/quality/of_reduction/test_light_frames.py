@@ -11,7 +11,7 @@ import cms
 import fe_models as fm
 from cms.assessment.quality.of_reduction.contents import CONTENTS
 from cms.assessment.quality.reduction_check import check_reduction
-from cms.assessment.quality.reference.free_basis import shape_rounding
+from cms.reduction.basis.free_basis import shape_rounding
 from fe_models.foundation.units import unit_system
 
 UNITS = unit_system("mm-t-s")

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from cms.assessment.quality.errors import QualityError
-from cms.assessment.quality.of_reduction.completeness import energy_error, static_completeness
+from cms.assessment.quality.of_reduction.completeness import static_completeness
 from cms.assessment.quality.of_reduction.conditioning import column_condition
 from cms.assessment.quality.of_reduction.frequencies import compare_frequencies, mac
 from cms.assessment.quality.of_reduction.full_shapes import full_shapes
@@ -17,11 +17,12 @@ from cms.assessment.quality.of_reduction.interface_stiffening import interface_s
 from cms.assessment.quality.of_reduction.mass_properties import check_grounding, rigid_mass_matrix
 from cms.assessment.quality.of_reduction.residuals import residual_bounds
 from cms.assessment.quality.reduction_check import check_reduction
-from cms.assessment.quality.reference.free_basis import FreeBasis, free_basis, ritz_basis
 from cms.assessment.quality.reference.full_reference import FullReference, usable_band
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets import MODE_SETS, craig_bampton, guyan
 from cms.reduction.basis.frames import BuckensFrame, NodalFrame, TisserandFrame
+from cms.reduction.basis.free_basis import FreeBasis, free_basis, ritz_basis
+from cms.reduction.error_estimates import energy_error
 from cms.reduction.reduction import reduce
 from fe_models.body.couplings.couplings import couple
 from fe_models.body.load_cases import LoadCase

@@ -1,4 +1,4 @@
-"""Free-free modes in the span of a mode set, over all dofs: the basis of comparisons with the full model."""
+"""Free-free modes in the span of a mode set, over all dofs: for comparisons with the full model and estimates."""
 
 from dataclasses import dataclass
 
@@ -6,16 +6,17 @@ import numpy as np
 import scipy.linalg as la
 
 from cms.body.reduced_body import BodyFrame
+from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
 from cms.linear_algebra.independent import Products, gram_in_blocks, independent_basis
 from cms.modes.families.families import Families
 from cms.modes.mode_set import ModeSet
-from cms.reduction.basis.finishing import finish
+from cms.reduction.basis.finishing import FinishedBasis, finish
 from cms.reduction.basis.frames import FrameCondition
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.tall.columns import combine, dots, gram, inner, of_this_process
 
-__all__ = ["FreeBasis", "ShapeRounding", "free_basis", "ritz_basis", "shape_rounding"]
+__all__ = ["FreeBasis", "ShapeRounding", "basis_of_finished", "free_basis", "ritz_basis", "shape_rounding"]
 
 MASSLESS = 1e-12  #: modal mass times omega_1² of a shape of unit W-norm, below which the shape is static
 
@@ -103,6 +104,25 @@ def free_basis(body: FEBody, modes: ModeSet, families: Families) -> FreeBasis:
     assert finished.A is not None
     rounding = shape_rounding(body, modes.columns, finished.A[:, order])
     return FreeBasis(Phi, np.diag(finished.K)[order], is_massive[order], N, dropped=finished.dropped, rounding=rounding)
+
+
+def basis_of_finished(families: Families, finished: FinishedBasis) -> FreeBasis:
+    """Return the free-free modes in the span of shapes that were finished in any frame.
+
+    Parameters
+    ----------
+    families
+        Mode families of the body; only the rigid-body motions are used.
+    """
+    N, M_N = families.free.N, families.free.M_N
+    Phi, K = of_this_process(finished.Phi), finished.K
+    C = inner(M_N, Phi)
+    has_mass = np.diag(finished.M) > 0
+    Z, is_massive = elastic_eigenvectors(K, finished.M - C.T @ C, float(np.diag(K)[has_mass].min(initial=1.0)))
+    omega2 = dots(Z, K @ Z)
+    order = np.lexsort((omega2, np.logical_not(is_massive)))
+    Z = Z[:, order]
+    return FreeBasis(combine(Phi, Z) - combine(N, C @ Z), omega2[order], is_massive[order], N)
 
 
 def ritz_basis(body: FEBody, X: Array, N: Array) -> FreeBasis:

@@ -1,0 +1,132 @@
+"""Estimated errors of free frequencies against the true ones, for every mode set; and what the estimates cost.
+
+python -m benchmarks.error_estimates                  # 60 bodies, all mode sets: some minutes
+python -m benchmarks.error_estimates --cost 12        # a bar of 48 x 12 x 12 bricks of tet10, 50 modes
+"""
+
+import argparse
+import logging
+import time
+import warnings
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import scipy.linalg as la
+
+import fe_models as fm
+from cms.errors import CmsError
+from cms.modes.families.families import Families
+from cms.modes.mode_sets import MODE_SETS
+from cms.reduction.basis.free_basis import free_basis
+from cms.reduction.error_estimates import error_estimates
+from cms.reduction.reduction import reduce
+from fe_models.body.fe_body import MULTIPLIER, FEBody
+from fe_models.errors import FeModelsError
+from tests.bodies import bar
+from tests.campaign.random_bodies import random_body
+
+LEAST, MOST = 1e-8, 0.5  #: true errors of frequency that are counted: below is rounding, above is no approximation
+SETS = [name for name in MODE_SETS if name != "user-basis"]
+
+
+def bodies(n: int) -> Iterator[tuple[int, FEBody]]:
+    """Yield coupled bodies with a seed: random ones of every element, and bars with up to 200 modes."""
+    for seed in range(n):
+        try:
+            body = fm.couple(random_body(seed).body)
+        except FeModelsError:  # bodies that no interface fits
+            continue
+        if not (body.dofs[:, 1] == MULTIPLIER).any():  # LAPACK needs a definite matrix
+            yield seed, body
+    for seed, kind in enumerate(("tetra10", "hexahedron20", "hexahedron", "wedge15")):
+        yield n + seed, fm.couple(bar(nx=16, ny=3, nz=3, kind=kind))
+
+
+def set_of(name: str, families: Families, rng: np.random.Generator) -> Any:
+    """Return a mode set with a random number of modes; None if the body has no such set."""
+    most = min(200, families.body.n_dof // 4)
+    options: dict[str, Any] = {"n_modes": int(rng.integers(3, max(4, most)))}
+    options = {"guyan": {}, "krylov": {"n_blocks": 2}}.get(name, options)
+    try:
+        return MODE_SETS[name](families, **options)
+    except (CmsError, TypeError):
+        return None
+
+
+def exact_frequencies(families: Families) -> np.ndarray:
+    """Return all elastic free frequencies by LAPACK: mu = 1 / (omega² + s) of M x = mu (K + s M) x."""
+    body, n_rigid = families.body, families.free.N.shape[1]
+    K, M = body.K.toarray(), body.M.toarray()
+    s = float(families.free_modes(n_modes=1).omega2[0])
+    size = 1 / np.sqrt(np.diag(K + s * M))
+    mu = la.eigh(M * np.outer(size, size), (K + s * M) * np.outer(size, size), eigvals_only=True)[::-1][n_rigid:]
+    return np.sqrt(1 / mu[mu > 1e-9 / s] - s) / (2 * np.pi)
+
+
+def judged(n: int) -> tuple[int, dict[str, np.ndarray]]:
+    """Return the number of bodies, and true and estimated errors of frequencies below the cutoff, for each set."""
+    found: dict[str, list[tuple[float, float]]] = {name: [] for name in SETS}
+    n_bodies = 0
+    for seed, body in bodies(n):
+        rng = np.random.default_rng(seed)
+        with Families(body, announce=False) as families:
+            exact = exact_frequencies(families)
+            n_bodies += 1
+            for name in SETS:
+                if (modes := set_of(name, families, rng)) is None:
+                    continue
+                try:
+                    errors = error_estimates(families, modes, free_basis(body, modes, families))
+                except CmsError:
+                    continue
+                k = min(len(errors.frequencies), len(exact))
+                found[name] += zip(errors.frequencies[:k] / exact[:k] - 1, errors.frequency[:k], strict=True)
+    return n_bodies, {name: np.array(pairs).reshape(-1, 2) for name, pairs in found.items()}
+
+
+def print_judged(n: int) -> None:
+    """Print for each set how many estimates are within a factor of two of the true error."""
+    n_bodies, found = judged(n)
+    print(f"{n_bodies} bodies; true errors from {LEAST:g} to {MOST:g}")
+    print(f"{'set':26s}{'modes':>7s}{'counted':>9s}{'in [0.5, 2]':>13s}{'least':>8s}{'most':>7s}{'exact':>7s}")
+    for name, pairs in [*found.items(), ("all", np.concatenate(list(found.values())))]:
+        true, estimate = pairs.T
+        is_counted = (true > LEAST) & (true < MOST)
+        ratio = estimate[is_counted] / true[is_counted]
+        within = f"{100 * np.mean((ratio >= 0.5) & (ratio <= 2)):.1f} %" if len(ratio) else ""
+        span = (f"{ratio.min():.2f}", f"{ratio.max():.2f}") if len(ratio) else ("", "")
+        n_exact = int((true <= LEAST).sum())
+        print(f"{name:26s}{len(true):7d}{len(ratio):9d}{within:>13s}{span[0]:>8s}{span[1]:>7s}{n_exact:7d}")
+
+
+def print_cost(n: int, n_modes: int) -> None:
+    """Print the time of the estimates beside that of the reduction, in processor time and by the clock."""
+    body = fm.couple(bar(nx=4 * n, ny=n, nz=n, width=0.25, height=0.25, kind="tetra10"))
+    seconds = {}
+    with Families(body) as families:
+        began = time.perf_counter(), time.process_time()
+        modes = MODE_SETS["craig-bampton"](families, n_modes=n_modes)
+        reduced = reduce(families, modes, errors=False)
+        seconds["set and reduction"] = time.perf_counter() - began[0], time.process_time() - began[1]
+        basis = free_basis(body, modes, families)
+        began = time.perf_counter(), time.process_time()
+        errors = error_estimates(families, modes, basis)
+        seconds["estimates"] = time.perf_counter() - began[0], time.process_time() - began[1]
+    print(f"{body.n_dof} dofs, {reduced.n_q} modes, {len(errors.frequencies)} of them judged")
+    for name, (clock, processor) in seconds.items():
+        print(f"{name:20s}{clock:8.1f} s by the clock, {processor:8.1f} s of the processors")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--bodies", type=int, default=60, help="number of seeds of random bodies")
+    parser.add_argument("--cost", type=int, help="elements across the bar whose estimates are timed")
+    parser.add_argument("--modes", type=int, default=50, help="number of modes of the timed set")
+    asked = parser.parse_args()
+    logging.disable(logging.WARNING)
+    warnings.simplefilter("ignore")
+    if asked.cost:
+        print_cost(asked.cost, asked.modes)
+    else:
+        print_judged(asked.bodies)

@@ -1,0 +1,60 @@
+"""How wrong a reduced body may be: estimates that were made with it, and are stored beside its modes."""
+
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.errors import ArgumentError
+from fe_models.foundation.records import ArrayShape, checked_fields, frozen_copies
+
+__all__ = ["ErrorEstimates"]
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+@checked_fields(ArgumentError)
+class ErrorEstimates:
+    """Errors of a reduced body relative to its finite element model (docs/theory.md, "Error estimates").
+
+    Parameters
+    ----------
+    frequencies
+        Free frequencies of the reduced body that were judged, the lowest ones, ascending, (n_judged,), in cycles per
+        time unit of the body.
+    frequency
+        Estimate of f_reduced / f - 1, (n_judged,), where f is the exact frequency of the same number. The exact error
+        is not smaller.
+    bound
+        Rigorous bound b, (n_judged,): some exact frequency f satisfies |(f_reduced / f)² - 1| <= b.
+    shape
+        Estimate of the error of each shape in the norm of strain energy, relative to the shape, (n_judged,).
+    interface_loads
+        Names of the unit loads at interfaces, (n_loads,).
+    interface
+        Error of the static response to each of these loads, in the norm of strain energy, (n_loads,); NaN: the load
+        does not deform the body.
+    inertia
+        Error of the static response to each rigid-body acceleration while the interfaces are fixed, in the norm of
+        strain energy, (n_r,); NaN: the acceleration does not deform the body.
+    method
+        How the estimates were made, in words.
+    date
+        Day on which they were made, such as "2027-01-31".
+    """
+
+    frequencies: Annotated[Array, ArrayShape(("n_judged",))]
+    frequency: Annotated[Array, ArrayShape(("n_judged",))]
+    bound: Annotated[Array, ArrayShape(("n_judged",))]
+    shape: Annotated[Array, ArrayShape(("n_judged",))]
+    interface_loads: Annotated[tuple[str, ...], ArrayShape(("n_loads",))] = ()
+    interface: Annotated[Array, ArrayShape(("n_loads",), has_nan=True)] = field(default_factory=lambda: np.zeros(0))
+    inertia: Annotated[Array, ArrayShape((None,), has_nan=True)] = field(default_factory=lambda: np.zeros(0))
+    method: str = ""
+    date: str = ""
+
+    @property
+    def distance(self) -> Array:
+        """Rigorous bound of |f_reduced / f - 1| for some exact frequency f, (n_judged,); inf: no bound."""
+        return np.where(self.bound < 1, 1 - np.sqrt(np.maximum(1 - self.bound, 0.0)), np.inf)

@@ -1,0 +1,168 @@
+"""Error estimates of a reduced body from the residuals of its modes and the factorisation that made its mode set.
+
+Let theta and phi be a Ritz pair of the free body in the span V of a mode set, phiᵀ M phi = 1, and G the flexibility of
+the free body. The correction of phi by one step of inverse iteration,
+
+    e = theta G M phi - phi,        |e|²_K = theta² phiᵀ M G M phi - theta,
+
+is K-orthogonal to V, because phi is a Galerkin solution.
+
+(1) Bound. Expand phi = sum c_j phi_j in the exact modes: |e|²_K = sum (lambda_j - theta)² c_j² / lambda_j and
+    sum lambda_j c_j² = theta, so that min_j |lambda_j - theta| / lambda_j <= |e|_K / sqrt(theta) = b. Some exact
+    frequency lies within this distance [1]_.
+(2) Estimate. The Rayleigh-Ritz method in span(V, e_1, ..., e_n) gives Ritz values lambda' between the exact ones and
+    theta, so theta / lambda' - 1 never exceeds theta / lambda - 1. A mode j that V lacks contributes with a factor
+    theta / lambda_j, so that little of the error is missed below the cutoff.
+(3) A mode that every phi lacks leaves no trace in e. A few random columns, M-orthogonal to V and smoothed by two steps
+    of inverse iteration, are added to the span, so that such a mode appears among the lambda'.
+
+References
+----------
+.. [1] B. N. Parlett, The Symmetric Eigenvalue Problem, SIAM 1998, chapters 10 and 11.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+import numpy as np
+import scipy.linalg as la
+
+from cms.body.error_estimates import ErrorEstimates
+from cms.linear_algebra.independent import Products
+from cms.modes.families.families import Families
+from cms.modes.mode_set import ModeSet
+from cms.reduction.basis.free_basis import FreeBasis
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.tall.columns import combine, dots, gram, inner, subtract
+
+__all__ = ["FrequencyErrors", "energy_error", "error_estimates", "frequency_errors"]
+
+JUDGED = 30  #: number of judged modes of a set without vibration modes, which has no cutoff
+RANDOM, STEPS, SEED = 6, 2, 20  #: number of random columns of (3), their steps of inverse iteration, and their seed
+EXACT = 1e-7  #: bound b, below which a mode is exact within rounding
+INDEPENDENT = 1e-10  #: smallest eigenvalue of the scaled Gram matrix of independent corrections
+CLUSTER = 1e-3  #: relative gap of frequencies, below which shapes are judged as a common subspace
+NO_ENERGY = 1e-24  #: strain energy of a response relative to the largest of its kind, below which it is zero
+STATIC_ROUNDING = 1e-5  #: error of a static response, below which it is rounding
+LOADS_AT_ONCE = 64  #: number of unit loads whose responses are in memory at a time
+METHOD = (
+    "frequency, shape: lower estimates, Rayleigh-Ritz with one step of inverse iteration; bound: rigorous, from the "
+    "residual; static responses: exact"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencyErrors:
+    """Errors of the lowest free frequencies; see `ErrorEstimates`."""
+
+    frequency: Array  #: estimate of f_reduced / f - 1, (n,)
+    bound: Array  #: rigorous bound b, (n,)
+    shape: Array  #: estimate of the error of the shape in the norm of strain energy, (n,)
+
+
+def error_estimates(families: Families, modes: ModeSet, basis: FreeBasis) -> ErrorEstimates:
+    """Estimate the errors of a reduced body with the factorisation of its families.
+
+    Parameters
+    ----------
+    families
+        Families of the body, open: their factorisation is used for as many solutions as modes are judged.
+    modes
+        The mode set.
+    basis
+        The free modes in its span.
+    """
+    frequencies = basis.frequencies()
+    vibrating = modes.frequencies[~modes.is_static]
+    n = int((frequencies <= vibrating.max()).sum()) if len(vibrating) else min(JUDGED, len(frequencies))
+    n = min(max(n, 1), len(frequencies))
+    errors = frequency_errors(families, basis, n)
+    labels = families.held_names("load")[0]
+    return ErrorEstimates(
+        frequencies[:n],
+        errors.frequency,
+        errors.bound,
+        errors.shape,
+        tuple(labels[k] for k in families.free.e),
+        without_rounding(interface_errors(families, basis)),
+        without_rounding(energy_error(families.body, basis, families.Psi_H)),
+        METHOD,
+        datetime.now(UTC).date().isoformat(),
+    )
+
+
+def frequency_errors(families: Families, basis: FreeBasis, n: int) -> FrequencyErrors:
+    """Estimate the errors of the lowest n free frequencies and shapes: n + 12 solutions with the factorisation."""
+    products, V, omega2 = Products.of_body(families.body), basis.Phi, basis.omega2
+    theta, n_V = omega2[:n], len(omega2)
+    E = theta * families.flexibility(products.M @ V[:, :n]) - V[:, :n]
+    K_E = products.K @ E
+    bound = np.sqrt(np.maximum(dots(E, K_E), 0.0) / theta)  # (1)
+    subtract(E, V, inner(V, K_E) / omega2[:, None])  # rounding
+    corrections = [E[:, bound > EXACT]]
+    for X in smoothed_columns(families, basis, products):  # (3)
+        before = dots(X, products.K @ X)
+        for _ in range(2):
+            K_X = products.K @ X
+            subtract(X, V, inner(V, K_X) / omega2[:, None])
+        corrections.append(X[:, dots(X, K_X) > EXACT**2 * before])
+    X = np.hstack(corrections)
+    K_X = products.K @ X
+    size = 1 / np.sqrt(np.maximum(dots(X, K_X), np.finfo(float).tiny))
+    energies, T = la.eigh(gram(X, K_X) * np.outer(size, size))
+    is_independent = energies > INDEPENDENT
+    T = size[:, None] * T[:, is_independent] / np.sqrt(energies[is_independent])
+    M_X = products.M @ X
+    inverse = np.where(basis.is_massive, 1 / omega2, 0.0)
+    beside = (inner(V, M_X) / np.sqrt(omega2)[:, None]) @ T
+    mu, Y = la.eigh(np.block([[np.diag(inverse), beside], [beside.T, T.T @ gram(X, M_X) @ T]]))  # (2)
+    mu, Y = mu[::-1][:n], Y[:n_V, ::-1][:, :n]
+    frequency = np.sqrt(np.maximum(theta * mu, 1.0)) - 1
+    is_near = basis.is_massive & (np.abs(np.sqrt(theta[:, None] / omega2) - 1) < CLUSTER)
+    inside = np.einsum("kj,jk->k", is_near, Y**2)
+    return FrequencyErrors(frequency, bound, np.sqrt(np.maximum(1 - inside, 0.0)))
+
+
+def smoothed_columns(families: Families, basis: FreeBasis, products: Products) -> Iterator[Array]:
+    """Yield random columns after each step of inverse iteration, which is made M-orthogonal to the span of the set."""
+    massive = basis.vibrating
+    F = products.M @ np.random.default_rng(SEED).standard_normal((families.body.n_dof, RANDOM))
+    for _ in range(STEPS):
+        X = families.flexibility(F)
+        F = products.M @ (X - combine(massive, inner(massive, products.M @ X)))
+        yield X
+
+
+# static responses, which are known exactly ----------------------------------------------------------------------------
+
+
+def without_rounding(errors: Array) -> Array:
+    """Return zero in place of errors that are rounding."""
+    return np.where(errors < STATIC_ROUNDING, 0.0, errors)
+
+
+def interface_errors(families: Families, basis: FreeBasis) -> Array:
+    """Return the error under a unit load at each excess boundary dof E, balanced by reactions at R, (n_e,)."""
+    free = families.free
+    z = np.zeros((len(families.h), len(free.e)))
+    z[free.e] = free.solve_boundary(np.eye(len(free.e)))
+    blocks = [z[:, first : first + LOADS_AT_ONCE] for first in range(0, z.shape[1], LOADS_AT_ONCE)]
+    errors = [energy_error(families.body, basis, combine(families.Psi_C, block)) for block in blocks]
+    return np.concatenate([np.zeros(0), *errors])
+
+
+def energy_error(body: FEBody, basis: FreeBasis, U: Array) -> Array:
+    """Return the relative energy error of approximating columns U by rigid motion and modes, (k,); NaN: no energy.
+
+    With c = Phiᵀ K u / omega² the energy of the error e = u - Phi c is computed, not the difference of two energies.
+    Rigid motion is subtracted first: it has no energy, but its rounding errors have.
+    """
+    products = Products.of_body(body)
+    U = U - combine(basis.N, inner(basis.N, products.M @ U))
+    K_U = products.K @ U
+    energy = dots(U, K_U)
+    subtract(U, basis.Phi, inner(basis.Phi, K_U) / basis.omega2[:, None])
+    has_energy = energy > NO_ENERGY * energy.max(initial=0.0)
+    return np.sqrt(np.maximum(dots(U, products.K @ U), 0.0) / np.where(has_energy, energy, np.nan))

@@ -1,0 +1,176 @@
+"""Estimated errors of frequencies, shapes and static responses against dense solutions of the whole model."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.linalg as la
+from numpy.testing import assert_allclose
+
+import cms
+import fe_models as fm
+from cms.modes.families.families import Families
+from cms.modes.mode_set import ModeSet
+from cms.modes.mode_sets import MODE_SETS
+from cms.reduction.reduction import reduce
+from fe_models.body.fe_body import Interface
+from fe_models.files.matrices.given import body_from_matrices
+from tests.bodies import bar, box_mesh, distorted
+
+EXACT = 1e-7  #: relative error of a frequency that is rounding
+EXACT_SETS = ("rubin", "normal")  #: sets that contain the free modes below their cutoff
+SETS = {
+    "craig-bampton": {"n_modes": 9}, "craig-bampton-ir": {"n_modes": 6}, "rubin": {"n_modes": 7}, "guyan": {},
+    "krylov": {"n_blocks": 2}, "attachment": {"n_modes": 9}, "normal": {"n_modes": 8},
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def body():
+    """A bent bar in general position, in mm and ms, with two rigid interfaces."""
+    mesh = distorted(box_mesh(6, 2, 1, 300.0, 60.0, 25.0), 0.1, seed=2)
+    turn = la.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
+    mesh = replace(mesh, nodes=mesh.nodes @ (turn * la.det(turn)).T + [40.0, -900.0, 300.0])
+    ports = [
+        Interface(name, "rigid", nodes := mesh.node_sets[name], mesh.nodes[nodes].mean(axis=0) + np.array([3, 1, -2]))
+        for name in ("left", "right")
+    ]
+    units = fm.unit_system("mm-kg-ms")
+    steel = fm.Material("steel", 210.0, 0.3, 7.85e-6)  # GPa = kg / (mm ms²)
+    return fm.couple(fm.solid_body(mesh, steel, name="bar", units=units, interfaces=ports))
+
+
+@pytest.fixture(scope="module")
+def exact(body):
+    """Elastic eigenvalues and M-orthonormal modes of the whole model, by LAPACK."""
+    omega2, Phi = la.eigh(body.K.toarray(), body.M.toarray())
+    return omega2[6:], Phi[:, 6:]
+
+
+@pytest.mark.parametrize("name", SETS)
+@pytest.mark.parametrize("frame", [cms.TisserandFrame(), cms.NodalFrame("left")], ids=str)
+def test_an_estimate_is_below_the_true_error_and_near_it(body, exact, name, frame):
+    with Families(body) as families:
+        modes = MODE_SETS[name](families, **SETS[name])
+        errors = reduce(families, modes, frame=frame).errors
+    f = np.sqrt(exact[0]) / (2 * np.pi)
+    true = errors.frequencies / f[: len(errors.frequencies)] - 1
+    is_judged = true > EXACT
+    assert (errors.frequency <= true + EXACT).all()
+    assert (errors.frequency >= 0.3 * true)[is_judged].all()
+    assert np.quantile((errors.frequency / true)[is_judged], 0.1) >= 0.5 if is_judged.any() else name in EXACT_SETS
+    nearest = np.abs(errors.frequencies[:, None] ** 2 / f**2 - 1).min(axis=1)
+    assert (nearest <= errors.bound + EXACT).all()
+    vibrating = modes.frequencies[~modes.is_static]
+    assert errors.frequencies[-1] <= vibrating.max(initial=0) or name in ("guyan", "krylov")
+
+
+def test_modes_that_a_set_contains_have_no_error(body):
+    with Families(body) as families:
+        errors = reduce(families, MODE_SETS["normal"](families, n_modes=8)).errors
+    assert len(errors.frequencies) == 8
+    assert errors.frequency.max() < 1e-10
+    assert errors.bound.max() < 1e-4
+
+
+def test_a_mode_that_a_set_lacks_is_seen_though_no_residual_has_it(body, exact):
+    """Exact modes 1, 2, 4, 5: all residuals are zero, and the third frequency of the set is that of mode 4."""
+    kept = [0, 1, 3, 4]
+    modes = ModeSet("some", exact[1][:, kept], tuple("abcd"), np.sqrt(exact[0][kept]) / (2 * np.pi))
+    with Families(body) as families:
+        families.fixed  # noqa: B018
+        errors = reduce(families, modes).errors
+    f = np.sqrt(exact[0])
+    assert_allclose(errors.frequency[:3], [0, 0, f[3] / f[2] - 1], rtol=0.3, atol=1e-9)
+    assert errors.bound.max() < 1e-4
+
+
+def test_the_error_of_a_shape_is_that_of_its_strain_energy(body, exact):
+    with Families(body) as families:
+        modes = MODE_SETS["craig-bampton"](families, n_modes=9)
+        made = reduce(families, modes)
+        basis = cms.reduction.basis.free_basis.free_basis(body, modes, families)
+    K, n = body.K, len(made.errors.frequencies)
+    true = []
+    for k in range(n):
+        phi = basis.Phi[:, k] / np.sqrt(basis.omega2[k])
+        true.append(np.sqrt(max(0.0, 1 - (phi @ (K @ exact[1][:, k])) ** 2 / exact[0][k])))
+    assert_allclose(made.errors.shape, true, rtol=0.1, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("name", "interface", "inertia"),
+    [("craig-bampton", True, False), ("craig-bampton-ir", True, True), ("normal", False, False)],
+)
+def test_static_responses_are_exact_by_construction_or_have_an_error(body, name, interface, inertia):
+    with Families(body) as families:
+        errors = reduce(families, MODE_SETS[name](families, n_modes=6)).errors
+    assert len(errors.interface_loads) == len(errors.interface) == 6
+    assert (errors.interface.max() == 0) == interface
+    assert (errors.inertia.max() == 0) == inertia
+    assert errors.inertia.shape == (6,)
+
+
+def test_exact_responses_of_a_slender_bar_are_not_lost_in_rounding():
+    """Under loads near the reactions it turns a thousand times more than it bends."""
+    with Families(fm.couple(bar(nx=40, length=10.0, width=0.02, height=0.02))) as families:
+        errors = reduce(families, MODE_SETS["craig-bampton"](families, n_modes=6)).errors
+    assert errors.interface.max() == 0
+
+
+def test_static_errors_are_those_of_a_dense_solution(body):
+    with Families(body) as families:
+        modes = MODE_SETS["normal"](families, n_modes=6)
+        errors = reduce(families, modes).errors
+        held, e = families.r, families.h[families.free.e]
+        Phi = modes.columns
+    K = body.K.toarray()
+    left = np.setdiff1d(np.arange(body.n_dof), held)
+    for k, dof in enumerate(e):
+        f = np.zeros(body.n_dof)
+        f[dof] = 1.0
+        u = np.zeros(body.n_dof)
+        u[left] = la.solve(K[np.ix_(left, left)], f[left], assume_a="pos")
+        d = u - Phi @ np.linalg.lstsq(Phi.T @ K @ Phi, Phi.T @ K @ u, rcond=1e-9)[0]
+        assert_allclose(errors.interface[k], np.sqrt((d @ K @ d) / (u @ K @ u)), rtol=1e-4)
+
+
+def test_a_held_body_is_judged_as_it_is_held():
+    """A cantilever: the rows of the left face are taken out."""
+    free = bar(nx=8)
+    keep = np.flatnonzero(free.nodes[free.dofs[:, 0], 0] > 0)
+    M, K = free.M[keep][:, keep], free.K[keep][:, keep]
+    right = [free.interfaces[1]]
+    held = fm.couple(
+        body_from_matrices(M, K, free.nodes, free.dofs[keep], name="c", units=free.units, interfaces=right, held=True)
+    )
+    with Families(held) as families:
+        errors = reduce(families, MODE_SETS["craig-bampton"](families, n_modes=6)).errors
+    n = len(errors.frequencies)
+    true = errors.frequencies / (np.sqrt(la.eigvalsh(held.K.toarray(), held.M.toarray())[:n]) / (2 * np.pi)) - 1
+    assert true.max() > 1e-3
+    assert_allclose(errors.frequency, true, rtol=0.5, atol=EXACT)
+
+
+def test_a_body_alone_is_judged_on_request(body):
+    modes = cms.craig_bampton(body, n_modes=6)
+    assert cms.reduce(body, modes).errors is None
+    asked = cms.reduce(body, modes, errors=True).errors
+    with Families(body) as families:
+        own = reduce(families, MODE_SETS["craig-bampton"](families, n_modes=6)).errors
+    assert_allclose(asked.frequency, own.frequency, rtol=1e-3)
+
+
+def test_errors_survive_a_file_and_other_units(body, tmp_path):
+    modes = cms.craig_bampton(body, n_modes=6)
+    made = cms.reduce(body, modes, errors=True)
+    cms.write(made, tmp_path / "bar.h5")
+    back = cms.read(tmp_path / "bar.h5").errors
+    for name in ("frequencies", "frequency", "bound", "shape", "interface", "inertia"):
+        assert_allclose(getattr(back, name), getattr(made.errors, name), rtol=0, atol=0)
+    assert (back.method, back.date, back.interface_loads) == (
+        made.errors.method, made.errors.date, made.errors.interface_loads
+    )  # fmt: skip
+    si = cms.read(tmp_path / "bar.h5", units="m-kg-s").errors
+    assert_allclose(si.frequencies, 1000 * made.errors.frequencies, rtol=1e-14)  # cycles per ms
+    assert_allclose(si.frequency, made.errors.frequency, rtol=0)
