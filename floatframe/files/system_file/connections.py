@@ -11,9 +11,11 @@ from floatframe.errors import ModelError
 from floatframe.files.system_file.coordinate_section import CoordinateSection
 from floatframe.files.system_file.described import (
     KEYS,
+    AcceptedTable,
     DescribedSection,
     Either,
     FunctionTable,
+    ObjectOf,
     OneOf,
     Signals,
     python_value,
@@ -51,20 +53,8 @@ class TermSection(CoordinateSection):
     factor: float = Field(description="a number other than 0, the coefficient of the coordinate")
 
 
-class LimitsSection(Table):
-    """[couplers.NAME.limits]: stops of a linear combination of coordinates."""
-
-    lower: float | None = Field(None, description="a number in the unit of the sum")
-    upper: float | None = Field(None, description="a number in the unit of the sum")
-    restitution: Annotated[float, Field(ge=0, le=1)] = Field(
-        0.0, description="a number from 0 to 1, Newton's coefficient of restitution"
-    )
-
-    def found(self) -> Limits:
-        """Return the limits of the table."""
-        return Limits(self.lower, self.upper, self.restitution)
-
-
+#: [couplers.NAME.limits]: stops of a linear combination of coordinates
+LimitsSection = Annotated[AcceptedTable, ObjectOf(Limits, "couplers.NAME.limits")]
 NumberOrFunction = Annotated[Any, Either((KEYS[float], KEYS[TimeFunction]))]
 
 
@@ -96,7 +86,7 @@ def coupler_of(name: str, section: CouplerSection, signals: Signals = None) -> C
         terms,
         python_value(section.constant, signals),
         section.engaged,
-        None if section.limits is None else section.limits.found(),
+        None if section.limits is None else section.limits.object_named(),
     )
 
 

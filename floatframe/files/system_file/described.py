@@ -103,7 +103,8 @@ class AcceptedTable(FieldsTable):
             return section
         except ModelError as error:
             # of a message such as "joint '': axis: expected ..." or "wheel: radius: expected ..."
-            text = re.sub(rf"^(\w+ ''|shape|{cls.__name__}|{re.escape(str(table.get('type')))}): ", "", str(error))
+            owner = rf"^(\w+ ''|shape|{cls.__name__}|{re.escape(str(table.get('type')))}): "
+            text = re.sub(owner, "", str(error), flags=re.IGNORECASE)
             key, _, reason = text.partition(": ")
             if key not in cls.model_fields or key not in table:
                 raise ValueError(text) from None

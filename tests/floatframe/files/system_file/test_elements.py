@@ -211,9 +211,21 @@ def test_sensors_of_couplers_and_control_measure_what_the_motion_has(write):
         measured(system, motion, [CouplerSensor("s", "pid")])
 
 
+TURNS = 'constant = {type = "harmonic", amplitude = 0.1, omega = 3.0}'
+
+
+def test_stops_of_a_coupler_stand_in_the_file(write):
+    system, _ = read_system(write((TURNS, "limits = {lower = -0.1, restitution = 0.5}")))
+    limits = system.couplers[0].limits
+    assert (limits.lower, limits.upper, limits.restitution) == (-0.1, None, 0.5)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
+        ((TURNS, "limits = {lower = 0.5, upper = 0.1}"), r"mesh.limits: expected lower below upper, .* \(line 41\)"),
+        ((TURNS, "limits = {lower = 0.5, restitution = 2}"), r"mesh.limits.restitution = 2: expected 0 to 1, got 2"),
+        (("omega = 3.0", 'omega = "3"'), r"mesh.constant.omega = .3.: expected a number: Angular frequency"),
         (('coordinate = "angle"', 'coordinate = "angel"'), "joint 'hub' has no coordinate 'angel'"),
         (('joint = "hub"', 'joint = "hbu"'), "no joint 'hbu'; did you mean 'hub'"),
         (('body_a = "wheel"\nmarker_a = [0, 0.1, 0]', 'body_a = "weel"'), 'body_a = "weel": there is no such body'),
