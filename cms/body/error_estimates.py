@@ -31,7 +31,7 @@ class ErrorEstimates:
     shape
         Estimate of the error of each shape in the norm of strain energy, relative to the shape, (n_judged,).
     interface_loads
-        Names of the unit loads at interfaces, (n_loads,).
+        Names of the unit loads at interfaces, or of random sums of them if they are very many, (n_loads,).
     interface
         Error of the static response to each of these loads, in the norm of strain energy, (n_loads,); NaN: the load
         does not deform the body.

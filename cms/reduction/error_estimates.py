@@ -46,7 +46,7 @@ INDEPENDENT = 1e-10  #: smallest eigenvalue of the scaled Gram matrix of indepen
 CLUSTER = 1e-3  #: relative gap of frequencies, below which shapes are judged as a common subspace
 NO_ENERGY = 1e-24  #: strain energy of a response relative to the largest of its kind, below which it is zero
 STATIC_ROUNDING = 1e-5  #: error of a static response, below which it is rounding
-LOADS_AT_ONCE = 64  #: number of unit loads whose responses are in memory at a time
+MOST_LOADS, SUMS = 120, 12  #: largest number of unit loads that are judged one by one, else number of sums
 METHOD = (
     "frequency, shape: lower estimates, Rayleigh-Ritz with one step of inverse iteration; bound: rigorous, from the "
     "residual; static responses: exact"
@@ -79,14 +79,14 @@ def error_estimates(families: Families, modes: ModeSet, basis: FreeBasis) -> Err
     n = int((frequencies <= vibrating.max()).sum()) if len(vibrating) else min(JUDGED, len(frequencies))
     n = min(max(n, 1), len(frequencies))
     errors = frequency_errors(families, basis, n)
-    labels = families.held_names("load")[0]
+    loads, interface = interface_errors(families, basis)
     return ErrorEstimates(
         frequencies[:n],
         errors.frequency,
         errors.bound,
         errors.shape,
-        tuple(labels[k] for k in families.free.e),
-        without_rounding(interface_errors(families, basis)),
+        loads,
+        without_rounding(interface),
         without_rounding(energy_error(families.body, basis, families.Psi_H)),
         METHOD,
         datetime.now(UTC).date().isoformat(),
@@ -117,8 +117,9 @@ def frequency_errors(families: Families, basis: FreeBasis, n: int) -> FrequencyE
     M_X = products.M @ X
     inverse = np.where(basis.is_massive, 1 / omega2, 0.0)
     beside = (inner(V, M_X) / np.sqrt(omega2)[:, None]) @ T
-    mu, Y = la.eigh(np.block([[np.diag(inverse), beside], [beside.T, T.T @ gram(X, M_X) @ T]]))  # (2)
-    mu, Y = mu[::-1][:n], Y[:n_V, ::-1][:, :n]
+    mass = np.block([[np.diag(inverse), beside], [beside.T, T.T @ gram(X, M_X) @ T]])
+    mu, Y = la.eigh(mass, subset_by_index=[len(mass) - n, len(mass) - 1])  # (2)
+    mu, Y = mu[::-1], Y[:n_V, ::-1]
     frequency = np.sqrt(np.maximum(theta * mu, 1.0)) - 1
     is_near = basis.is_massive & (np.abs(np.sqrt(theta[:, None] / omega2) - 1) < CLUSTER)
     inside = np.einsum("kj,jk->k", is_near, Y**2)
@@ -143,14 +144,20 @@ def without_rounding(errors: Array) -> Array:
     return np.where(errors < STATIC_ROUNDING, 0.0, errors)
 
 
-def interface_errors(families: Families, basis: FreeBasis) -> Array:
-    """Return the error under a unit load at each excess boundary dof E, balanced by reactions at R, (n_e,)."""
+def interface_errors(families: Families, basis: FreeBasis) -> tuple[tuple[str, ...], Array]:
+    """Return names and errors of the unit loads at the excess boundary dofs E, balanced by reactions at R.
+
+    If there are very many of them, random sums of unit loads take their places.
+    """
     free = families.free
-    z = np.zeros((len(families.h), len(free.e)))
-    z[free.e] = free.solve_boundary(np.eye(len(free.e)))
-    blocks = [z[:, first : first + LOADS_AT_ONCE] for first in range(0, z.shape[1], LOADS_AT_ONCE)]
-    errors = [energy_error(families.body, basis, combine(families.Psi_C, block)) for block in blocks]
-    return np.concatenate([np.zeros(0), *errors])
+    labels, loads = families.held_names("load")[0], np.eye(len(free.e))
+    names = tuple(labels[k] for k in free.e)
+    if len(names) > MOST_LOADS:
+        loads = np.random.default_rng(SEED).choice([-1.0, 1.0], (len(names), SUMS))
+        names = tuple(f"sum {k + 1} of all unit loads, with random signs" for k in range(SUMS))
+    z = np.zeros((len(families.h), len(names)))
+    z[free.e] = free.solve_boundary(loads)
+    return names, energy_error(families.body, basis, combine(families.Psi_C, z))
 
 
 def energy_error(body: FEBody, basis: FreeBasis, U: Array) -> Array:

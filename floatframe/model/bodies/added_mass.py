@@ -129,6 +129,7 @@ def with_masses(body: ReducedBody, masses: Sequence[AddedMass]) -> ReducedBody:
         moments=moments,
         geometric=None if geometric is None else replace(geometric, turned=None, spread=None),
         free_frequencies=np.zeros(0),
+        errors=None,
         columns=None,
         nodal_sums=None,
         provenance={**body.provenance, "added masses": note},

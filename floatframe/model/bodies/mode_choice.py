@@ -50,6 +50,7 @@ def with_modes(body: ReducedBody, modes: Sequence[int]) -> ReducedBody:
             S_kl=moments.S_kl[:, :, k][:, :, :, k],
         ),
         free_frequencies=np.zeros(0),
+        errors=None,  # those of all modes together
         Phi=body.Phi[:, :, k],
         interfaces=tuple(replace(i, Psi=i.Psi[:, k]) for i in body.interfaces),
         columns=None,

@@ -118,6 +118,18 @@ def test_exact_responses_of_a_slender_bar_are_not_lost_in_rounding():
     assert errors.interface.max() == 0
 
 
+def test_very_many_unit_loads_are_judged_by_random_sums(monkeypatch, body):
+    with Families(body) as families:
+        modes = {name: MODE_SETS[name](families, n_modes=6) for name in ("craig-bampton", "normal")}
+        plain = reduce(families, modes["normal"]).errors.interface
+        monkeypatch.setattr(cms.reduction.error_estimates, "MOST_LOADS", 5)
+        found = {name: reduce(families, each).errors for name, each in modes.items()}
+    assert len(found["normal"].interface_loads) == len(found["normal"].interface) == 12
+    assert found["craig-bampton"].interface.max() == 0
+    assert plain.min() < found["normal"].interface.max() < 1
+    assert "random signs" in found["normal"].interface_loads[0]
+
+
 def test_static_errors_are_those_of_a_dense_solution(body):
     with Families(body) as families:
         modes = MODE_SETS["normal"](families, n_modes=6)
