@@ -16,7 +16,13 @@ from floatframe.engine.kernels.connections.coupler import (
 from floatframe.engine.kernels.connections.element_law import law_derivatives, law_rates, law_rows
 from floatframe.engine.kernels.connections.pair_force import pair_derivatives, pair_rows
 from floatframe.engine.kernels.connections.user_force import user_force_derivatives, user_force_rows
-from floatframe.engine.kernels.joints.relative_motion import direction, distance, put_pair, relative_velocity
+from floatframe.engine.kernels.joints.relative_motion import (
+    by_markers,
+    direction,
+    distance,
+    put_pair,
+    relative_velocity,
+)
 from floatframe.engine.kernels.joints.row_formulas import (
     held_by_place,
     held_rates,
@@ -113,12 +119,12 @@ def connection_derivatives(model, work, c, c_k):
     else:
         w = work.state.w[w0 : w0 + size]
         for r in range(size):
-            joint_row_derivatives(model, work, w0 + r, r, a, b, w, c_k, P_a, P_b, V)
+            joint_row_derivatives(model, work, w0 + r, a, b, w, c_k, by_markers(work, a, b, r), V[r])
 
 
 @small
-def joint_row_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
-    """Write derivatives of row k of a joint: by motions of its markers to row r of P_a and P_b, by its wrench to V.
+def joint_row_derivatives(model, work, k, a, b, w, c_k, by, V):
+    """Write derivatives of row k of a joint: by motions of its markers to `by`, by its wrench to V, (size,).
 
     For c_k = 0 rows serve to find velocities or accelerations; P of a velocity constraint then has its derivatives by
     velocities in the columns of positions. The change of a soft row's reaction due to its change of direction is
@@ -126,20 +132,20 @@ def joint_row_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
     """
     kind, holds = model.rows.kind[k], model.rows.holds[k]
     if holds == NOTHING:
-        wrench_derivatives(kind, model, work, k, r, a, b, w, c_k, P_a, P_b, V)
+        wrench_derivatives(kind, model, work, k, a, b, w, c_k, by, V)
         return
     _, n, m_a, m_b = held_value(kind, model, work, k, a, b)
     first = 0
     if holds == VELOCITY and c_k > 0.0:
         first = 6
-        held_by_place(kind, model, work, k, r, a, b, P_a, P_b)
-    put_pair(P_a, P_b, r, first, scaled(-1.0, n))
-    put(P_a[r], first + 3, m_a)
-    put(P_b[r], first + 3, m_b)
+        held_by_place(kind, model, work, k, a, b, by)
+    put_pair(by, first, scaled(-1.0, n))
+    put(by.a, first + 3, m_a)
+    put(by.b, first + 3, m_b)
     soft = model.rows.soft[k]
     if soft > 0.0:
-        put_sum(V[r], 0, scaled(-soft, n))
-        put_sum(V[r], model.rows.part[k], scaled(-soft, m_b))
+        put_sum(V, 0, scaled(-soft, n))
+        put_sum(V, model.rows.part[k], scaled(-soft, m_b))
 
 
 @inner

@@ -21,6 +21,7 @@ from floatframe.engine.kernels.compiler.compilation import inner, small
 from floatframe.engine.kernels.joints.relative_motion import (
     add_coordinate_gradient,
     add_pair,
+    by_markers,
     distance,
     loaded_axis,
     loaded_coordinate,
@@ -121,14 +122,14 @@ def coordinate_gradient(model, work, p, r, by_x, by_v):
     """Add by_x dx + by_v dv to row r of P at both markers; x, v: value and rate of coordinate p."""
     markers = work.markers
     a, b, k = ends_and_row(model, p)
-    P_a, P_b = work.connections.P[a], work.connections.P[b]
+    by = by_markers(work, a, b, r)
     if model.rows.kind[k] != SPAN:
-        add_coordinate_gradient(model.rows, markers, k, a, b, P_a, P_b, r, by_x, by_v)
+        add_coordinate_gradient(model.rows, markers, k, a, b, by, by_x, by_v)
         return
     e, d, v = force_direction(model, work, p), distance(markers, a, b), relative_velocity(markers, a, b)
     across = sub(v, scaled(dot(e, v), e))
-    add_pair(P_a, P_b, r, 0, sub(scaled(-by_x, e), scaled(by_v / dot(e, d), across)))
-    add_pair(P_a, P_b, r, 6, scaled(-by_v, e))
+    add_pair(by, 0, sub(scaled(-by_x, e), scaled(by_v / dot(e, d), across)))
+    add_pair(by, 6, scaled(-by_v, e))
 
 
 @inner
@@ -149,7 +150,7 @@ def coordinate_derivatives(model, work, c, p, Q, column, by_unknown, c_k):
     """Write P and V for the rows of coordinate p of connection c, with force Q = by_unknown w[column]."""
     a, b, k = ends_and_row(model, p)
     w0 = model.connections.w0[c]
-    P_a, P_b, V = work.connections.P[a], work.connections.P[b], work.connections.V[c]
+    V = work.connections.V[c]
     r = k - w0
     V[r, r], V[r + 1, r + 1] = 1.0, 1.0
     coordinate_gradient(model, work, p, r, -c_k, 0.0)
@@ -158,15 +159,15 @@ def coordinate_derivatives(model, work, c, p, Q, column, by_unknown, c_k):
     if f < 0:
         return
     e, d, kind = force_direction(model, work, p), distance(work.markers, a, b), model.rows.kind[k]
-    P = P_b if kind == TWIST_B else P_a
     for i in range(3):  # row of F + Q e for an axis of the ground
         axis, r = unit(i), f - w0 + i
+        by = by_markers(work, a, b, r)
         V[r, r] = 1.0
         V[r, column - w0] = by_unknown * dot(axis, e)
         if kind == SPAN:  # de = (1 - e eᵀ) dd / |d|
-            add_pair(P_a, P_b, r, 0, scaled(-c_k * Q / norm(d), sub(axis, scaled(dot(axis, e), e))))
+            add_pair(by, 0, scaled(-c_k * Q / norm(d), sub(axis, scaled(dot(axis, e), e))))
         else:  # axis · (dphi × e) = dphi · (e × axis)
-            put_sum(P[r], 3, scaled(c_k * Q, cross(e, axis)))
+            put_sum(by.b if kind == TWIST_B else by.a, 3, scaled(c_k * Q, cross(e, axis)))
     if m < 0:
         return
     F = vector(work.state.w[f:])
@@ -174,7 +175,7 @@ def coordinate_derivatives(model, work, c, p, Q, column, by_unknown, c_k):
         axis, r = unit(i), m - w0 + i
         V[r, r] = 1.0
         put(V[r], f - w0, cross(d, axis))  # axis · (d × dF) = dF · (axis × d)
-        add_pair(P_a, P_b, r, 0, scaled(c_k, cross(F, axis)))  # axis · (dd × F) = dd · (F × axis)
+        add_pair(by_markers(work, a, b, r), 0, scaled(c_k, cross(F, axis)))  # axis · (dd × F) = dd · (F × axis)
 
 
 @inner

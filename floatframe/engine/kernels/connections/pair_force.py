@@ -18,7 +18,7 @@ from floatframe.engine.kernels.compiler.compilation import inner, small
 from floatframe.engine.kernels.connections.bushing import bushing_power, bushing_state, bushing_variation
 from floatframe.engine.kernels.connections.contact import V_0, contact_power, contact_state, contact_variation
 from floatframe.engine.kernels.connections.spring_damper import spring_power, spring_state, spring_variation
-from floatframe.engine.kernels.joints.relative_motion import add_pair, distance, put_pair, slip
+from floatframe.engine.kernels.joints.relative_motion import add_pair, by_markers, distance, put_pair, slip
 from floatframe.engine.kernels.model import BUSHING, CONTACT, SPRING
 from floatframe.engine.kernels.vector import add, cross, matrix, put, put_matrix, scaled, sub, unit, vector
 
@@ -106,23 +106,24 @@ def pair_derivatives(model, work, c, c_k):
         work.connections.V[c, r, r] = 1.0
         if r < ON_A or r >= ON_B:
             g_d, g_u, g_v, g_w = slopes_of(pair, r)
-            put_pair(P_a, P_b, r, 0, scaled(c_k, add(g_d, cross(omega_a, g_v))))
-            put_pair(P_a, P_b, r, 6, scaled(c_k, g_v))
+            by = by_markers(work, a, b, r)
+            put_pair(by, 0, scaled(c_k, add(g_d, cross(omega_a, g_v))))
+            put_pair(by, 6, scaled(c_k, g_v))
             if size > ON_A:
                 turn = add(sub(cross(g_d, d), g_u), add(cross(g_v, v), cross(g_w, omega)))
                 if r < V_0:
                     turn = add(turn, cross(pair.F if r < ON_A else pair.N, unit(r % 3)))
-                put(P_a[r], 3, scaled(-c_k, turn))
-                put(P_b[r], 3, scaled(-c_k, g_u))
-                put(P_a[r], 9, scaled(c_k, sub(g_w, cross(g_v, d))))
-                put(P_b[r], 9, scaled(-c_k, g_w))
+                put(by.a, 3, scaled(-c_k, turn))
+                put(by.b, 3, scaled(-c_k, g_u))
+                put(by.a, 9, scaled(c_k, sub(g_w, cross(g_v, d))))
+                put(by.b, 9, scaled(-c_k, g_w))
     if size > ON_A:
         for r in range(3):  # M = N + d × F
             arm = cross(unit(r), d)
             for j in range(12):
                 P_a[ON_A + r, j] = P_a[ON_B + r, j] + arm[0] * P_a[0, j] + arm[1] * P_a[1, j] + arm[2] * P_a[2, j]
                 P_b[ON_A + r, j] = P_b[ON_B + r, j] + arm[0] * P_b[0, j] + arm[1] * P_b[1, j] + arm[2] * P_b[2, j]
-            add_pair(P_a, P_b, ON_A + r, 0, scaled(c_k, cross(pair.F, unit(r))))
+            add_pair(by_markers(work, a, b, ON_A + r), 0, scaled(c_k, cross(pair.F, unit(r))))
 
 
 @small

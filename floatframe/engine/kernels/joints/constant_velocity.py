@@ -59,13 +59,13 @@ def bisector_value(model, work, k, a, b, w):
 
 
 @inner
-def bisector_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
+def bisector_derivatives(model, work, k, a, b, w, c_k, by, V):
     """BISECTOR: M · (dphi × E) × S = dphi · (E × (S × M)), M · E × (dphi × Z) = dphi · (Z × (M × E))."""
     rows = model.rows
     part = rows.part[k]
     E, Z_a, Z_b = shafts(rows, work.markers, k, a, b)
     M, S = vector(w[part:]), add(Z_a, Z_b)
-    put(V[r], part, cross(E, S))
+    put(V, part, cross(E, S))
     across = cross(M, E)
-    put(P_a[r], 3, scaled(c_k, add(cross(E, cross(S, M)), cross(Z_a, across))))
-    put(P_b[r], 3, scaled(c_k, cross(Z_b, across)))
+    put(by.a, 3, scaled(c_k, add(cross(E, cross(S, M)), cross(Z_a, across))))
+    put(by.b, 3, scaled(c_k, cross(Z_b, across)))

@@ -340,12 +340,12 @@ def line_free_value(model, work, k, a, b, w):
 
 
 @inner
-def line_free_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
+def line_free_derivatives(model, work, k, a, b, w, c_k, by, V):
     """Write the derivatives of LINE_FREE."""
     n_0, m = free_moment(model, work, a)
-    put(V[r], FORCE, n_0)
+    put(V, FORCE, n_0)
     turn = cross(n_0, vector(w))
     if model.markers.moment[a] >= 0:
-        put(V[r], MOMENT, m)
+        put(V, MOMENT, m)
         turn = add(turn, cross(m, vector(w[MOMENT:])))
-    put(P_a[r], 3, scaled(c_k, turn))
+    put(by.a, 3, scaled(c_k, turn))

@@ -39,7 +39,7 @@ def loaded_value(model, work, k, a, b, w):
 
 
 @inner
-def loaded_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
+def loaded_derivatives(model, work, k, a, b, w, c_k, by, V):
     """Write the derivatives of PUSH, TWIST or TWIST_B."""
     rows, markers = model.rows, work.markers
     part, is_angle = rows.part[k], rows.kind[k] != PUSH
@@ -47,14 +47,14 @@ def loaded_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
     x, v = loaded_coordinate(rows, markers, k, a, b)
     normal, along = normal_force(w, e)
     _, Q_x, Q_v, Q_n = coordinate_force(model, work, k, is_angle, x, v, normal)
-    put(V[r], part, e)
+    put(V, part, e)
     turn = cross(e, vector(w[part:]))  # derivative by a rotation of the marker with the axis
     if Q_n != 0.0 and normal > 0.0:
         f, F = Q_n / normal, vector(w)
-        put_sum(V[r], 0, scaled(f, sub(F, scaled(along, e))))
+        put_sum(V, 0, scaled(f, sub(F, scaled(along, e))))
         turn = sub(turn, scaled(f * along, cross(e, F)))
-    add_coordinate_gradient(rows, markers, k, a, b, P_a, P_b, r, c_k * Q_x, c_k * Q_v)
+    add_coordinate_gradient(rows, markers, k, a, b, by, c_k * Q_x, c_k * Q_v)
     if rows.kind[k] == TWIST_B:
-        put_sum(P_b[r], 3, scaled(c_k, turn))
+        put_sum(by.b, 3, scaled(c_k, turn))
     else:
-        put_sum(P_a[r], 3, scaled(c_k, turn))
+        put_sum(by.a, 3, scaled(c_k, turn))

@@ -1,17 +1,21 @@
 """Relative motion of two markers, the basis of rows of joints and coordinates."""
 
 import math
+from typing import NamedTuple
 
-from floatframe.engine.kernels.compiler.compilation import inner, small
+from fe_models.foundation.arrays import Array
+from floatframe.engine.kernels.compiler.compilation import inner, small, view
 from floatframe.engine.kernels.time_function import time_function
 from floatframe.engine.kernels.vector import add, cross, dot, put, put_sum, scaled, sub, turned, vector
 from floatframe.model.joints.rows.kinds import PUSH, TWIST_B
 
 __all__ = [
+    "ByMarkers",
     "add_coordinate_gradient",
     "add_pair",
     "angle_between",
     "axis_between",
+    "by_markers",
     "direction",
     "distance",
     "loaded_axis",
@@ -117,32 +121,48 @@ def loaded_coordinate(rows, markers, k, a, b):
 
 
 @inner
-def add_coordinate_gradient(rows, markers, k, a, b, P_a, P_b, r, by_x, by_v):
-    """Add by_x dx + by_v dv to row r of P; x, v: value and rate of the coordinate of row k, see `loaded_rows`."""
+def add_coordinate_gradient(rows, markers, k, a, b, by, by_x, by_v):
+    """Add by_x dx + by_v dv to a row of P; x, v: value and rate of the coordinate of row k, see `loaded_rows`."""
     e = loaded_axis(rows, markers, k, a, b)
-    add_pair(P_a, P_b, r, 9 if rows.kind[k] != PUSH else 6, scaled(-by_v, e))
+    add_pair(by, 9 if rows.kind[k] != PUSH else 6, scaled(-by_v, e))
     if rows.kind[k] != PUSH:
         _, t = turned_angle(rows, markers, k, a, b)
-        add_pair(P_a, P_b, r, 3, scaled(by_x, t))
+        add_pair(by, 3, scaled(by_x, t))
         turn = cross(e, sub(vector(markers.omega[b]), vector(markers.omega[a])))
-        put_sum(P_b[r] if rows.kind[k] == TWIST_B else P_a[r], 3, scaled(by_v, turn))
+        put_sum(by.b if rows.kind[k] == TWIST_B else by.a, 3, scaled(by_v, turn))
         return
     d = distance(markers, a, b)
     arm, s = cross(e, d), slip(markers, a, b, d)
-    add_pair(P_a, P_b, r, 0, sub(scaled(by_v, cross(e, vector(markers.omega[a]))), scaled(by_x, e)))
-    put_sum(P_a[r], 3, add(scaled(by_x, arm), scaled(by_v, cross(e, s))))
-    put_sum(P_a[r], 9, scaled(by_v, arm))
+    add_pair(by, 0, sub(scaled(by_v, cross(e, vector(markers.omega[a]))), scaled(by_x, e)))
+    put_sum(by.a, 3, add(scaled(by_x, arm), scaled(by_v, cross(e, s))))
+    put_sum(by.a, 9, scaled(by_v, arm))
+
+
+class ByMarkers(NamedTuple):
+    """Derivatives of one row of a connection by displacement, rotation, velocity and angular velocity of its markers.
+
+    They are parts of P, (12,) each.
+    """
+
+    a: Array  #: by the motion of marker A
+    b: Array
+
+
+@view
+def by_markers(work, a, b, r):
+    """Return row r of P at markers a and b."""
+    return ByMarkers(work.connections.P[a, r], work.connections.P[b, r])
 
 
 @small
-def add_pair(P_a, P_b, r, column, x):
-    """Add x to row r of P at marker A, and -x at marker B."""
-    put_sum(P_a[r], column, x)
-    put_sum(P_b[r], column, scaled(-1.0, x))
+def add_pair(by, column, x):
+    """Add x to a row of P at marker A, and -x at marker B."""
+    put_sum(by.a, column, x)
+    put_sum(by.b, column, scaled(-1.0, x))
 
 
 @small
-def put_pair(P_a, P_b, r, column, x):
-    """Write x into row r of P at marker A, and -x at marker B."""
-    put(P_a[r], column, x)
-    put(P_b[r], column, scaled(-1.0, x))
+def put_pair(by, column, x):
+    """Write x into a row of P at marker A, and -x at marker B."""
+    put(by.a, column, x)
+    put(by.b, column, scaled(-1.0, x))

@@ -106,16 +106,16 @@ def roll_rates(model, work, k, a, b):
 
 
 @inner
-def roll_by_place(model, work, k, r, a, b, P_a, P_b):
-    """Write the derivatives of a ROLL row by the marker positions into row r of P."""
+def roll_by_place(model, work, k, a, b, by):
+    """Write the derivatives of a ROLL row by the marker positions."""
     rows, markers = model.rows, work.markers
     N, n, c, s, rho = rim(rows, markers, k, a, b)
     omega_a, omega_b = vector(markers.omega[a]), vector(markers.omega[b])
     t = direction(markers, a, rows.x[k])
-    put_pair(P_a, P_b, r, 0, cross(t, omega_a))  # t·(-omega_A × dd) = -dd·(t × omega_A)
-    put(P_a[r], 3, cross(t, rim_velocity(markers, a, b, rho)))
+    put_pair(by, 0, cross(t, omega_a))  # t·(-omega_A × dd) = -dd·(t × omega_A)
+    put(by.a, 3, cross(t, rim_velocity(markers, a, b, rho)))
     g = cross(t, sub(omega_b, omega_a))  # t·(omega × drho) = drho·(t × omega)
-    add_by_rim(P_a, P_b, r, rows.c[k], g, N, n, c, s)
+    add_by_rim(by, rows.c[k], g, N, n, c, s)
 
 
 @inner
@@ -127,19 +127,19 @@ def rim_value(model, work, k, a, b, w):
 
 
 @inner
-def rim_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
+def rim_derivatives(model, work, k, a, b, w, c_k, by, V):
     """Write the derivatives of RIM: x · (dN_w - rho × dF - drho × F)."""
     rows = model.rows
     N, n, c, s, rho = rim(rows, work.markers, k, a, b)
     x = vector(rows.x[k])
-    put(V[r], MOMENT_B, x)
-    put(V[r], FORCE, cross(rho, x))
-    add_by_rim(P_a, P_b, r, rows.c[k], scaled(c_k, cross(x, vector(w))), N, n, c, s)
+    put(V, MOMENT_B, x)
+    put(V, FORCE, cross(rho, x))
+    add_by_rim(by, rows.c[k], scaled(c_k, cross(x, vector(w))), N, n, c, s)
 
 
 @inner
-def add_by_rim(P_a, P_b, r, R, g, N, n, c, s):
-    """Add the derivatives of g · rho to row r of P.
+def add_by_rim(by, R, g, N, n, c, s):
+    """Add the derivatives of g · rho to a row of P.
 
     rho = -R u,  du = (dN - dc n - c dn)/s + u c dc/s²,  dc = dN·n + N·dn, dN = dphi_A × N, ... so that
     g·du = A·dN + B·dn with m = (u c/s - n)·g/s:  A = g/s + m n,  B = m N - c g/s.
@@ -147,5 +147,5 @@ def add_by_rim(P_a, P_b, r, R, g, N, n, c, s):
     u = scaled(1 / s, sub(N, scaled(c, n)))
     m = (dot(u, g) * c / s - dot(n, g)) / s
     A, B = add(scaled(1 / s, g), scaled(m, n)), sub(scaled(m, N), scaled(c / s, g))
-    put_sum(P_a[r], 3, scaled(-R, cross(N, A)))
-    put_sum(P_b[r], 3, scaled(-R, cross(n, B)))
+    put_sum(by.a, 3, scaled(-R, cross(N, A)))
+    put_sum(by.b, 3, scaled(-R, cross(n, B)))

@@ -93,7 +93,7 @@ class Held(NamedTuple):
 
     value: Function  #: returns the value, (model, work, k, a, b) -> g, n, m_a, m_b
     rates: Function  #: returns the rates, (model, work, k, a, b) -> dg/dt, beta
-    #: for velocity constraints: writes derivatives by positions, (model, work, k, r, a, b, P_a, P_b)
+    #: for velocity constraints: writes derivatives by positions, (model, work, k, a, b, by)
     by_place: Function | None = None
 
 
@@ -101,7 +101,7 @@ class Wrench(NamedTuple):
     """Functions that evaluate a row which defines part of the wrench."""
 
     value: Function  #: returns the value, (model, work, k, a, b, w) -> number
-    derivatives: Function  #: writes the derivatives, (model, work, k, r, a, b, w, c_k, P_a, P_b, V)
+    derivatives: Function  #: writes the derivatives, (model, work, k, a, b, w, c_k, by, V)
 
 
 LOADED = Wrench(loaded_rows.loaded_value, loaded_rows.loaded_derivatives)
@@ -138,11 +138,11 @@ held_rates = by_code("held_rates", {code: kind.rates for code, kind in HELD.item
 held_by_place = by_code(
     "held_by_place",
     {code: kind.by_place for code, kind in HELD.items() if kind.by_place is not None},
-    "model, work, k, r, a, b, P_a, P_b",
+    "model, work, k, a, b, by",
 )
 wrench_value = by_code("wrench_value", {code: kind.value for code, kind in WRENCH.items()}, "model, work, k, a, b, w")
 wrench_derivatives = by_code(
     "wrench_derivatives",
     {code: kind.derivatives for code, kind in WRENCH.items()},
-    "model, work, k, r, a, b, w, c_k, P_a, P_b, V",
+    "model, work, k, a, b, w, c_k, by, V",
 )

@@ -1,7 +1,7 @@
 """Rows that define the wrench of a joint: zero along free directions, and balance of its parts on A and B.
 
 A kind consists of two functions: `value`(model, work, k, a, b, w) with w the wrench of the connection, and
-`derivatives`(model, work, k, r, a, b, w, c_k, P_a, P_b, V), which writes row r of P (times c_k) and of V. Both rows
+`derivatives`(model, work, k, a, b, w, c_k, by, V), which writes row r of P (times c_k) and of V. Both rows
 must be zero before. A direction E that rotates with a marker changes by dphi × E, so that
 d(E · W) = dphi · (E × W) + E · dW.
 """
@@ -33,12 +33,12 @@ def gauge_value(model, work, k, a, b, w):
 
 
 @small
-def gauge_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
+def gauge_derivatives(model, work, k, a, b, w, c_k, by, V):
     """Write the derivatives of GAUGE."""
     rows = model.rows
     part, E = rows.part[k], direction(work.markers, a, rows.x[k])
-    put(P_a[r], 3, scaled(c_k, cross(E, vector(w[part:]))))
-    put(V[r], part, E)
+    put(by.a, 3, scaled(c_k, cross(E, vector(w[part:]))))
+    put(V, part, E)
 
 
 @inner
@@ -49,12 +49,12 @@ def gauge_b_value(model, work, k, a, b, w):
 
 
 @inner
-def gauge_b_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
+def gauge_b_derivatives(model, work, k, a, b, w, c_k, by, V):
     """Write the derivatives of GAUGE_B."""
     rows = model.rows
     part, D = rows.part[k], direction(work.markers, b, rows.y[k])
-    put(P_b[r], 3, scaled(c_k, cross(D, vector(w[part:]))))
-    put(V[r], part, D)
+    put(by.b, 3, scaled(c_k, cross(D, vector(w[part:]))))
+    put(V, part, D)
 
 
 @inner
@@ -66,14 +66,14 @@ def thread_value(model, work, k, a, b, w):
 
 
 @inner
-def thread_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
+def thread_derivatives(model, work, k, a, b, w, c_k, by, V):
     """Write the derivatives of THREAD."""
     rows = model.rows
     c, E = rows.c[k], direction(work.markers, a, rows.x[k])
     W = add(vector(w[MOMENT_B:]), scaled(c, vector(w)))
-    put(P_a[r], 3, scaled(c_k, cross(E, W)))
-    put(V[r], MOMENT_B, E)
-    put(V[r], FORCE, scaled(c, E))
+    put(by.a, 3, scaled(c_k, cross(E, W)))
+    put(V, MOMENT_B, E)
+    put(V, FORCE, scaled(c, E))
 
 
 @small
@@ -86,14 +86,14 @@ def arm_value(model, work, k, a, b, w):
 
 
 @small
-def arm_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
+def arm_derivatives(model, work, k, a, b, w, c_k, by, V):
     """Write the derivatives of ARM; (x × d) · F = d · (F × x)."""
     x, d = vector(model.rows.x[k]), distance(work.markers, a, b)
-    put(V[r], FORCE, cross(d, x))
-    put(V[r], MOMENT, x)
+    put(V, FORCE, cross(d, x))
+    put(V, MOMENT, x)
     if len(w) > MOMENT_B:
-        put(V[r], MOMENT_B, scaled(-1.0, x))
-    put_pair(P_a, P_b, r, 0, scaled(c_k, cross(vector(w), x)))
+        put(V, MOMENT_B, scaled(-1.0, x))
+    put_pair(by, 0, scaled(c_k, cross(vector(w), x)))
 
 
 @inner
@@ -103,9 +103,9 @@ def rod_value(model, work, k, a, b, w):
 
 
 @inner
-def rod_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
+def rod_derivatives(model, work, k, a, b, w, c_k, by, V):
     """Write the derivatives of ROD."""
     x = vector(model.rows.x[k])
-    put(V[r], FORCE, x)
-    V[r, 3] = -dot(x, distance(work.markers, a, b))
-    put_pair(P_a, P_b, r, 0, scaled(c_k * w[3], x))
+    put(V, FORCE, x)
+    V[3] = -dot(x, distance(work.markers, a, b))
+    put_pair(by, 0, scaled(c_k * w[3], x))
