@@ -19,8 +19,10 @@ Described in `floatframe.model.elements.element`.
 """
 
 import math
+from typing import NamedTuple
 
-from floatframe.engine.kernels.compiler.compilation import inner
+from fe_models.foundation.arrays import Array
+from floatframe.engine.kernels.compiler.compilation import inner, view
 from floatframe.engine.kernels.compiler.user_call import call_law
 from floatframe.engine.kernels.connections.user_force import note_no_number, put_state_derivatives, state_rows
 from floatframe.engine.kernels.marker import marker_acceleration
@@ -155,8 +157,6 @@ def law_derivatives(model, work, c, c_k):
     law_inputs(model, work, c)
     data = laws.data[laws.data0[i] : laws.data0[i + 1]]
     call_law(laws.tangent[i], laws.head[i], work.laws.inputs, data, slopes)
-    per = laws.head[i, 1] - 6  # columns of a marker
-    n_columns = per * n + n_z + n_lam
     for m in range(a, a + n):
         if model.markers.accelerated[m] >= 0:
             for r in range(size):
@@ -164,62 +164,94 @@ def law_derivatives(model, work, c, c_k):
                     work.connections.P_a[model.markers.accelerated[m], r, j] = 0.0
     r, states = 0, laws.row0[i + 1] - laws.row0[i]
     for j in range(laws.row0[i], laws.row0[i + 1]):
-        own = slopes[laws.source[j] * n_columns : (laws.source[j] + 1) * n_columns]
         V[r, r] = 1.0
-        add_slopes(model, work, V, a, n, n_z, n_lam, per, states, r, -c_k * laws.factor[j], -laws.factor[j], own)
+        own = output_slopes(laws.head[i], slopes, laws.source[j])
+        add_slopes(model, work, a, r, by_unknowns(V[r], states, n_z), -c_k * laws.factor[j], -laws.factor[j], own)
         r += 1
     o = 6 * n
     for s in range(laws.state0[i], laws.state0[i] + n_z):
-        own = slopes[o * n_columns : (o + 1) * n_columns]
         put_state_derivatives(work, V, s, r)
-        add_slopes(model, work, V, a, n, n_z, n_lam, per, states, r + 1, -c_k, -1.0, own)
+        own = output_slopes(laws.head[i], slopes, o)
+        add_slopes(model, work, a, r + 1, by_unknowns(V[r + 1], states, n_z), -c_k, -1.0, own)
         for m in range(a, a + n):
             for j in range(12):
                 work.connections.P[m, r, j], work.connections.P[m, r + 2, j] = 0.0, 0.0
         o, r = o + 1, r + 3
     for _ in range(n_lam):
-        own = slopes[o * n_columns : (o + 1) * n_columns]
+        own, unknowns = output_slopes(laws.head[i], slopes, o), by_unknowns(V[r], states, n_z)
         holds = model.rows.holds[w0 + r]
         if holds == NOTHING:
-            add_slopes(model, work, V, a, n, n_z, n_lam, per, states, r, c_k, 1.0, own)
+            add_slopes(model, work, a, r, unknowns, c_k, 1.0, own)
         else:
-            held_slopes(work, V, a, n, n_z, n_lam, per, states, r, holds, c_k, own)
+            held_slopes(work, a, r, unknowns, holds, c_k, own)
         o, r = o + 1, r + 1
 
 
+class Slopes(NamedTuple):
+    """Derivatives of one output of a law."""
+
+    motion: Array  #: by the motion of each marker, (n, 12), or (n, 18) with accelerations
+    states: Array  #: (n_z,)
+    multipliers: Array  #: (n_lam,)
+
+
+class ByUnknowns(NamedTuple):
+    """The part of a row of V for the unknowns of a law."""
+
+    states: Array  #: by value, rate and algorithmic rate of each state, (n_z, 3)
+    multipliers: Array  #: (n_lam,)
+
+
+@view
+def output_slopes(head, slopes, o):
+    """Return the derivatives of output o from those of all outputs of a law."""
+    n, columns, n_z, n_lam = head[0], head[1] - 6, head[2], head[3]
+    size = columns * n + n_z + n_lam
+    own = slopes[o * size : (o + 1) * size]
+    end = columns * n
+    return Slopes(own[:end].reshape((n, columns)), own[end : end + n_z], own[end + n_z :])
+
+
+@view
+def by_unknowns(V, first, n_z):
+    """Return the derivatives of a row, (size,), by n_z states and by the multipliers; first: column of the states."""
+    end = first + 3 * n_z
+    return ByUnknowns(V[first:end].reshape((n_z, 3)), V[end:])
+
+
 @inner
-def add_slopes(model, work, V, a, n, n_z, n_lam, per, states, r, by_motion, by_unknown, own):
-    """Add the scaled derivatives of one output to row r of P, P_a and V."""
-    for m in range(n):
+def add_slopes(model, work, a, r, V, by_motion, by_unknown, own):
+    """Add the scaled derivatives of one output to row r of P, P_a and V; a: first marker."""
+    for m in range(own.motion.shape[0]):
         for j in range(12):
-            work.connections.P[a + m, r, j] = by_motion * own[per * m + j]
+            work.connections.P[a + m, r, j] = by_motion * own.motion[m, j]
         accelerated = model.markers.accelerated[a + m]
         if accelerated >= 0:
             for j in range(6):
-                work.connections.P_a[accelerated, r, j] = by_unknown * own[per * m + 12 + j]
-    for s in range(n_z):
-        V[r, states + 3 * s] += by_unknown * own[per * n + s]
-    for j in range(n_lam):
-        V[r, states + 3 * n_z + j] += by_unknown * own[per * n + n_z + j]
+                work.connections.P_a[accelerated, r, j] = by_unknown * own.motion[m, 12 + j]
+    for s in range(own.states.shape[0]):
+        V.states[s, 0] += by_unknown * own.states[s]
+    for j in range(own.multipliers.shape[0]):
+        V.multipliers[j] += by_unknown * own.multipliers[j]
 
 
 @inner
-def held_slopes(work, V, a, n, n_z, n_lam, per, states, r, holds, c_k, own):
-    """Write the derivatives of the constrained quantities into row r of P and V."""
-    for m in range(n):
+def held_slopes(work, a, r, V, holds, c_k, own):
+    """Write the derivatives of the constrained quantities into row r of P and V; a: first marker."""
+    for m in range(own.motion.shape[0]):
         for j in range(12):
             if holds == POSITION:
-                slope = own[per * m + j] if j < 6 else 0.0
+                slope = own.motion[m, j] if j < 6 else 0.0
             elif c_k > 0.0:
-                slope = own[per * m + j]
+                slope = own.motion[m, j]
             else:
-                slope = own[per * m + 6 + j] if j < 6 else 0.0
+                slope = own.motion[m, 6 + j] if j < 6 else 0.0
             work.connections.P[a + m, r, j] = slope
     if c_k > 0.0:
-        for s in range(n_z):
-            V[r, states + 3 * s] = own[per * n + s] / c_k
-        for j in range(n_lam):
-            V[r, states + 3 * n_z + j] = own[per * n + n_z + j] / c_k
+        for s in range(own.states.shape[0]):
+            V.states[s, 0] = own.states[s] / c_k
+        for j in range(own.multipliers.shape[0]):
+            V.multipliers[j] = own.multipliers[j] / c_k
 
 
 @inner

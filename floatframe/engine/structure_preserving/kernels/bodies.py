@@ -11,6 +11,9 @@ changes of products between q_0 and q_1, so that w_0ᵀ (M_c(q_1) - M_c(q_0)) w_
 from `inertia_force`.
 """
 
+from typing import NamedTuple
+
+from fe_models.foundation.arrays import Array
 from floatframe.engine.kernels.body import (
     axial,
     block,
@@ -134,9 +137,18 @@ def momenta(model, discrete, step, t, n, q, omega, q_dot, Y):
     return add(Pi, scaled(0.5, add(turned(P, omega), turned_back(P, omega))))
 
 
+class ModalMotion(NamedTuple):
+    """Modal coordinates of a body with its angular velocity and their rates."""
+
+    q: Array  #: (n,)
+    omega: tuple[float, float, float]
+    rate: Array  #: (n,)
+
+
 @loops
-def inertia_force(model, discrete, step, t, n, q_0, q_1, q_mean, C_mean, omega_0, rate_0, omega_1, rate_1, out):
-    """Write N_k, (n,), the modal inertia force 1/2 w_0ᵀ M_c,k w_1 between two configurations."""
+def inertia_force(model, discrete, step, t, n, start, end, q_mean, C_mean, out):
+    """Write N_k, (n,), the modal inertia force 1/2 w_0ᵀ M_c,k w_1 between two motions."""
+    (q_0, omega_0, rate_0), (q_1, omega_1, rate_1) = start, end
     m = model.body_types.mass[t]
     V, W, C = step.V, step.W, step.C
     products(discrete, t, n, q_mean, PRODUCTS, V)
@@ -334,11 +346,9 @@ def body_inertia(model, discrete, step, i):
     if n == 0:
         return
     q_mean = step.q_mean[q0 : q0 + n]
-    inertia_force(
-        model, discrete, step, t, n, step.q_0[q0 : q0 + n], step.q_1[q0 : q0 + n], q_mean, C_mean,
-        vector(step.w_0[u0 + 3 :]), step.w_0[u0 + 6 : u0 + 6 + n], vector(step.w_1[u0 + 3 :]),
-        step.w_1[u0 + 6 : u0 + 6 + n], N,
-    )  # fmt: skip
+    start = ModalMotion(step.q_0[q0 : q0 + n], vector(step.w_0[u0 + 3 :]), step.w_0[u0 + 6 : u0 + 6 + n])
+    end = ModalMotion(step.q_1[q0 : q0 + n], vector(step.w_1[u0 + 3 :]), step.w_1[u0 + 6 : u0 + 6 + n])
+    inertia_force(model, discrete, step, t, n, start, end, q_mean, C_mean, N)
     subtract_elastic(discrete, step, t, n, q_mean, step.dq[q0 : q0 + n], N)
     for k in range(n):
         out[u0 + 6 + k] = 0.5 * h * (step.P_1[u0 + 6 + k] - step.P_0[u0 + 6 + k]) - 0.5 * h * h * N[k]
@@ -347,18 +357,19 @@ def body_inertia(model, discrete, step, i):
 @loops
 def subtract_elastic(discrete, step, t, n, q_mean, dq, N):
     """Subtract elastic forces K q and damping forces D dq/h from the modal forces, with numerical dissipation in q."""
-    K, D, q = block(discrete, t, STIFFNESS, n * n), block(discrete, t, DAMPING, n * n), step.vector
+    K = block(discrete, t, STIFFNESS, n * n).reshape((n, n))
+    D, q = block(discrete, t, DAMPING, n * n).reshape((n, n)), step.vector
     for k in range(n):
         q[k] = q_mean[k]
     if discrete.is_filtered:
-        X = block(discrete, t, STIFFNESS_FILTER, n * n)
+        X = block(discrete, t, STIFFNESS_FILTER, n * n).reshape((n, n))
         for k in range(n):
             for j in range(n):
-                q[k] += X[k * n + j] * dq[j]
+                q[k] += X[k, j] * dq[j]
     for k in range(n):
         total = 0.0
         for j in range(n):
-            total += K[k * n + j] * q[j] + D[k * n + j] * dq[j] / step.h
+            total += K[k, j] * q[j] + D[k, j] * dq[j] / step.h
         N[k] -= total
 
 
@@ -374,5 +385,6 @@ def interval(model, discrete, step, i):
     if n:
         C = step.C_interval
         shapes(discrete, t, n, q, C)
-        inertia_force(model, discrete, step, t, n, q, q, q, C, omega, rate, omega, rate, step.force)
+        middle = ModalMotion(q, omega, rate)
+        inertia_force(model, discrete, step, t, n, middle, middle, q, C, step.force)
         subtract_elastic(discrete, step, t, n, q, step.dq[q0 : q0 + n], step.force)

@@ -269,15 +269,13 @@ def matrix_column(model, work, tree, tangent, s):
 @inner
 def kept_marker(model, work, tree, tangent, m, first, rate):
     """Add rows and columns for marker m of a connection outside the tree, whose rows begin at `first`."""
-    i, c = model.markers.body[m], model.markers.connection[m]
-    p = sub(vector(work.markers.r[m]), vector(tangent.origin))
-    v, omega = vector(work.markers.v[m]), vector(work.markers.omega[m])
+    i = model.markers.body[m]
     b = i
     while b >= 0:
         for j in range(tree.jet0[b], tree.jet0[b + 1]):
             reach, screw = tangent.reach[j], tangent.screw[j]
             xi, xi_dot = pair(reach), pair(reach[6:])
-            kept_pair(model, work, tangent, m, c, first, tree.jet_s[j], xi, xi_dot, pair(screw), p, v, omega)
+            kept_pair(model, work, tangent, m, first, tree.jet_s[j], xi, xi_dot, pair(screw))
         b = tree.parent[b]
     if model.markers.psi0[m] < 0:
         return
@@ -292,18 +290,19 @@ def kept_marker(model, work, tree, tangent, m, first, rate):
         unit = world_screw(R, origin, s)
         own = world_screw(R, origin, s_1)
         xi_dot = pair_sum(pair_sum(scaled_pair(rate, unit), own), spatial_cross(V, unit))
-        kept_pair(model, work, tangent, m, c, first, tree.m0[i] + k, unit, xi_dot, unit, p, v, omega)
+        kept_pair(model, work, tangent, m, first, tree.m0[i] + k, unit, xi_dot, unit)
 
 
 @inner
-def kept_pair(model, work, tangent, m, c, first, s, xi, xi_dot, unit, p, v, omega):
-    """Add row and column of unknown s, which moves marker m of connection c by xi, xi_dot; unit: its screw."""
+def kept_pair(model, work, tangent, m, first, s, xi, xi_dot, unit):
+    """Add row and column of unknown s, which moves marker m by xi, xi_dot; unit: its screw."""
     C, B, motion, P = tangent.C, tangent.B, tangent.motion, work.connections.P[m]
+    p, v = sub(vector(work.markers.r[m]), vector(tangent.origin)), vector(work.markers.v[m])
     put(motion, 0, add(xi[0], cross(xi[1], p)))
     put(motion, 3, xi[1])
     put(motion, 6, add(add(xi_dot[0], cross(xi_dot[1], p)), cross(xi[1], v)))
-    put(motion, 9, add(xi_dot[1], cross(xi[1], omega)))
-    for r in range(model.connections.size[c]):
+    put(motion, 9, add(xi_dot[1], cross(xi[1], vector(work.markers.omega[m]))))
+    for r in range(model.connections.size[model.markers.connection[m]]):
         total = 0.0
         for k in range(12):
             total += P[r, k] * motion[k]
