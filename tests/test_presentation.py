@@ -133,6 +133,14 @@ def test_what_public_functions_return_shows_itself_in_notebooks():
     assert sorted(f"{each.__module__}.{each.__name__}" for each in found if not hasattr(each, "_repr_html_")) == []
 
 
+def test_every_public_data_class_shows_itself_in_notebooks():
+    assert [name for each, name in PUBLIC.items() if not hasattr(each, "_repr_html_")] == []
+    page = ff.Marker("rod", "end")._repr_html_()
+    assert "<b>Marker</b>" in page
+    assert "interface</th><td style='text-align:left'>&#x27;end&#x27;</td>" in page
+    assert "triad" not in page  # it has its default
+
+
 def test_parts_of_a_motion_print_at_most_2000_characters(objects):
     motion = objects[6]
     joint, body = motion.joint("pin"), motion.body("rod")

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 
 from fe_models.foundation.words import shortened
 
-__all__ = ["Summary", "listed", "presented", "text_of"]
+__all__ = ["Summary", "listed", "presented", "shown_in_notebooks", "text_of"]
 
 Class = TypeVar("Class", bound=type)
 
@@ -90,6 +90,12 @@ def presented(kind: Class) -> Class:
 
     kind.__repr__ = text  # type: ignore[method-assign, assignment]
     kind._repr_html_ = lambda self: show(self).html()  # type: ignore[attr-defined]
+    return kind
+
+
+def shown_in_notebooks(kind: Class) -> Class:
+    """Decorate a data class: notebooks show its fields that differ from defaults; `repr` stays that of a data class."""
+    kind._repr_html_ = lambda self: summary_of_fields(self).html()  # type: ignore[attr-defined]
     return kind
 
 

@@ -21,6 +21,7 @@ from typing_extensions import get_protocol_members, is_protocol
 
 from fe_models.foundation.arrays import SYMMETRY_DEFECT, IntArray, frozen, require_finite
 from fe_models.foundation.errors import BodyError, ReportedError
+from fe_models.foundation.presentation import shown_in_notebooks
 from fe_models.foundation.tall.columns import are_finite
 from fe_models.foundation.tall.on_disk import row_slices
 from fe_models.foundation.words import nearest, quoted
@@ -333,6 +334,8 @@ def conformed_inputs(where: str, subject: Hashable, given: Mapping[str, Any], er
 def checked_fields(error: type[Exception], *, misfit: type[Exception] = BodyError) -> Callable[[Class], Class]:
     """Decorate a data class: its fields are checked against their annotations and shapes before its own checks.
 
+    Notebooks show the fields as a table, unless the class is `presented`.
+
     Parameters
     ----------
     error
@@ -359,7 +362,7 @@ def checked_fields(error: type[Exception], *, misfit: type[Exception] = BodyErro
                 own(self)
 
         kind.__post_init__ = check  # type: ignore[attr-defined]
-        return kind
+        return kind if hasattr(kind, "_repr_html_") else shown_in_notebooks(kind)
 
     return decorate
 

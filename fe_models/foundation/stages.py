@@ -81,8 +81,8 @@ def notebook_bar(words: str) -> Callable[[str, bool], None] | None:
         return None
     from IPython.display import HTML, display
 
-    def shown(text: str, is_at_end: bool) -> Any:
+    def page_of(text: str, is_at_end: bool) -> Any:
         return HTML(f"<progress{' value=1' if is_at_end else ''}></progress> {html.escape(text)}")
 
-    handle = display(shown(words, False), display_id=True)
-    return lambda text, is_at_end: handle.update(shown(text, is_at_end))
+    handle = display(page_of(words, False), display_id=True)
+    return lambda text, is_at_end: handle.update(page_of(text, is_at_end))

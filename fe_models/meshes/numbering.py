@@ -25,6 +25,7 @@ KINDS = ("nodes", "elements")
 NO_NUMBERS = frozen(np.zeros(0), np.int64)  #: empty array for unknown numbers
 
 
+@presented
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)

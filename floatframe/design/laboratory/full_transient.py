@@ -40,6 +40,7 @@ __all__ = ["FrameAcceleration", "FullTransient", "full_transient"]
 MOST_NUMBERS = 2.5e8  #: largest number of results in memory, 2 GB
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class FrameAcceleration:

@@ -7,6 +7,7 @@ import numpy as np
 
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from fe_models.meshes.numbering import NONE
 from floatframe.durability.fatigue.criteria import Criterion
@@ -18,6 +19,7 @@ from floatframe.errors import FatigueError, ModelError
 __all__ = ["FatigueMaterial", "Places", "assessed_places", "point_number"]
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class FatigueMaterial:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from floatframe.durability.shaking.loads.inputs import input_index, require_damped
 from floatframe.durability.shaking.loads.levels import Level, in_model, level_rms
@@ -34,6 +35,7 @@ ROUNDING = 1e-9  #: largest magnitude of a negative eigenvalue of a coherence ma
 CHUNK_SIZE = 4_000_000  #: largest number of stress values in memory
 
 
+@presented
 @dataclass(frozen=True)
 @checked_fields(ModelError)
 class CrossSpectrum:

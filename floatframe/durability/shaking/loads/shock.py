@@ -8,6 +8,7 @@ import numpy as np
 import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from floatframe.durability.shaking.loads.inputs import input_index
 from floatframe.durability.shaking.loads.pulses import Synthesis
@@ -67,6 +68,7 @@ class SpectrumRequest:
             raise ModelError(f"{where}: first, last: expected rising frequencies, got {self.first:g} and {self.last:g}")
 
 
+@presented
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class TimeTest:
