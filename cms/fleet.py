@@ -14,9 +14,8 @@ from typing import Any
 from cms.errors import JobError
 from cms.jobs.job import Job, read_job
 from cms.linear_algebra.solvers.registry import solver_of
-from fe_models.foundation.digest import file_digest
 from fe_models.foundation.parametric_file import extended_files
-from fe_models.foundation.paths import file_identity, remove_parts
+from fe_models.foundation.paths import file_digest, file_identity, remove_parts
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.tasks.campaign import Campaign, open_task_journal
 from fe_models.foundation.tasks.installation import source_mark

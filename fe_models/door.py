@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
-__all__ = ["Door", "Registry", "door_names", "names_of", "namespaces", "open_door", "places_of"]
+__all__ = ["Door", "Registry", "door_names", "names_of", "namespaces", "open_door", "package_of", "places_of"]
 
 log = logging.getLogger(__name__)
 

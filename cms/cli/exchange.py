@@ -14,10 +14,11 @@ from cms.cli.console import output_path, print_table, say, stages
 from cms.errors import ExportError, ForeignBodyError, JobError, ModalFileError, RecoveryError
 from cms.exchange.export import WRITERS, export_body, unknown_format
 from cms.exchange.import_body import BODY_FORMATS, REDUCED_MATRICES
+from fe_models.door import package_of
 from fe_models.files.cad.cad_units import GEOMETRIES
 from fe_models.files.read_deck import DECKS
 from fe_models.files.read_matrices import MATRIX_FORMATS
-from fe_models.files.read_mesh import MESHES
+from fe_models.files.read_mesh import MESH_FORMATS, MESHES
 from fe_models.foundation.formats import Format
 from fe_models.foundation.units import UNIT_SYSTEMS
 
@@ -54,11 +55,11 @@ OUT = ("program", "format", "--to", "what is lost", "tried")
 def list_formats(*, as_json: bool, as_markdown: bool) -> None:
     """Print the formats that are read and those that are written, as tables, as JSON, or for docs/formats.md."""
     if as_json:
-        typer.echo(json.dumps([known.record() for known in FORMATS], indent=2))
+        typer.echo(json.dumps([known.record() for known in (*FORMATS, *formats_of_packages())], indent=2))
     elif as_markdown:
         typer.echo(markdown_tables())
     else:
-        print_table("What comes in", IN, rows_in())
+        print_table("What comes in", IN, rows_in(*formats_of_packages()))
         print_table("What goes out", OUT, rows_out())
 
 
@@ -74,9 +75,16 @@ def markdown(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
     return "\n".join(f"| {' | '.join(row)} |" for row in cells)
 
 
-def rows_in() -> list[tuple[str, ...]]:
-    """Return the cells of the formats that are read."""
-    return [(f.program, format_words(f), f.holds, f.lost, f.tried) for f in FORMATS if f.reads]
+def formats_of_packages() -> tuple[Format, ...]:
+    """Return the formats of meshes that other installed packages read; the packages are not imported."""
+    return tuple(
+        Format("mesh", package_of(point), "mesh", (suffix,)) for suffix, point in MESH_FORMATS.not_loaded.items()
+    )
+
+
+def rows_in(*others: Format) -> list[tuple[str, ...]]:
+    """Return the cells of the formats that are read, of this project and others."""
+    return [(f.program, format_words(f), f.holds, f.lost, f.tried) for f in (*FORMATS, *others) if f.reads]
 
 
 def rows_out() -> list[tuple[str, ...]]:

@@ -14,8 +14,8 @@ from cms.cli.arguments import Memory, SetValues, Solver, Workers, changes_of
 from cms.cli.console import USER_ERROR, guarded, output_path, print_error, print_table, say, stages
 from cms.cli.info import print_body
 from cms.errors import JobError
-from fe_models.foundation.digest import file_digest
 from fe_models.foundation.errors import ReportedError
+from fe_models.foundation.paths import file_digest
 from fe_models.foundation.ranks.mpi import all_ranks
 from fe_models.foundation.ranks.ranks import RankError, require_agreement, started_ranks
 

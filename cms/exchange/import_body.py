@@ -26,9 +26,8 @@ from fe_models.files.matrices.foreign_matrices import SCALAR, ForeignMatrices
 from fe_models.files.read_matrices import read_matrices
 from fe_models.files.read_mesh import read_geometry
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.digest import file_digest
 from fe_models.foundation.formats import HEAD, Format
-from fe_models.foundation.paths import bytes_of, reading
+from fe_models.foundation.paths import bytes_of, file_digest, reading
 from fe_models.foundation.units import Units, unit_system
 from fe_models.foundation.words import nearest, quoted
 

@@ -42,8 +42,8 @@ from fe_models.elements.shells.body import shell_body
 from fe_models.elements.shells.quality import WARP_LIMIT
 from fe_models.elements.solids.body import solid_body
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.digest import file_digest
 from fe_models.foundation.errors import BodyError
+from fe_models.foundation.paths import file_digest
 from fe_models.foundation.ranks.ranks import Ranks
 from fe_models.foundation.stages import Stages
 from fe_models.foundation.words import nearest

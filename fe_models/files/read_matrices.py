@@ -42,9 +42,8 @@ from fe_models.files.matrices.triangles import mirrored
 from fe_models.files.nastran.matrices.op2 import is_op2
 from fe_models.files.nastran.matrices.op4 import is_op4
 from fe_models.files.nastran.matrices.parts import read_op2_part, read_op4_part, read_punch_part
-from fe_models.foundation.digest import file_digest
 from fe_models.foundation.formats import HEAD, ReadFormat, format_of
-from fe_models.foundation.paths import bytes_of, reading
+from fe_models.foundation.paths import bytes_of, file_digest, reading
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = [

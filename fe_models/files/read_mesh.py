@@ -16,9 +16,8 @@ from fe_models.files.med import read_med
 from fe_models.files.nastran.mesh import read_nastran
 from fe_models.files.vtk import read_vtk
 from fe_models.foundation.arrays import IntArray
-from fe_models.foundation.digest import file_digest
 from fe_models.foundation.formats import ReadFormat, by_suffix
-from fe_models.foundation.paths import bytes_of, reading
+from fe_models.foundation.paths import bytes_of, file_digest, reading
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.cells.line_cells import line_mesh_from_raw
 from fe_models.meshes.cells.raw_mesh import LINES, RawMesh, mesh_from_raw, require_nodes

@@ -1,5 +1,6 @@
 """Files: reading with one message for each fault, and atomic replacement, but never of devices and pipes."""
 
+import hashlib
 import os
 import re
 import secrets
@@ -13,8 +14,8 @@ from pathlib import Path
 from fe_models.foundation.words import damage, nearest
 
 __all__ = [
-    "bytes_of", "file_identity", "is_stream", "near_file", "reading", "remove_parts", "replace_file", "replace_files",
-    "same_file", "sync_folder",
+    "bytes_of", "file_digest", "file_identity", "is_stream", "near_file", "reading", "remove_parts", "replace_file",
+    "replace_files", "same_file", "sync_folder",
 ]  # fmt: skip
 
 OWN_DESCRIPTOR = re.compile(r"/(?:dev|proc/self)/fd/(\d{1,6})")
@@ -83,6 +84,14 @@ def reading(
         raise error(f"{where}: not enough memory to read {size / 1e6:.0f} MB as {known}") from failure
     except (Exception, SystemExit) as failure:
         raise error(f"{where}: could not be read as {known}: {damage(failure)}") from failure
+
+
+def file_digest(path: str | Path) -> str:
+    """Return the sha256 of a file, read in blocks; "" if the file does not exist."""
+    if not path or not Path(path).is_file():
+        return ""
+    with Path(path).open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def own_descriptor(path: Path) -> int | None:

@@ -5,7 +5,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 
-from fe_models.foundation.digest import file_digest
+from fe_models.foundation.paths import file_digest
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.kernels.memory import Rows
 from floatframe.integrators.integrator import Integrator

@@ -1,5 +1,6 @@
 """A package of its own adds mode sets, elements, joints, sensors and readers by entry points, without an edit here."""
 
+import json
 import subprocess
 import sys
 
@@ -225,5 +226,9 @@ def test_a_package_adds_a_mode_set_an_element_a_joint_a_sensor_and_a_reader(fold
     assert "sensors.height: floatframe.sensors 'acme.number' of package acme-fe 1.2: " in sensor
     assert "expected a dataclass with the methods measure and linear" in sensor
     assert "fe_models.readers '.broken' of package acme-fe 1.2: " in last
+    command = [sys.executable, "-m", "cms.cli", "formats", "--json"]
+    listed = json.loads(subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stdout)
+    readers = {each["suffixes"][0]: each["program"] for each in listed if each["holds"] == "mesh"}
+    assert readers[".plain"] == readers[".broken"] == "package acme-fe 1.2", "the package is not imported"
     for group, name in (("cms.mode_sets", "rubin"), ("floatframe.joints", "revolute")):
         assert f"{group} '{name}' of package acme-fe 1.2: left out, this project has it" in done.stderr

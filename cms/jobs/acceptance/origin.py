@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from fe_models.foundation.digest import file_digest
+from fe_models.foundation.paths import file_digest
 
 __all__ = ["GROUPS", "SourceFile", "origin_groups", "source_files"]
 

@@ -2,15 +2,13 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from hashlib import sha256
 from pathlib import Path
 
 from fe_models.errors import MeshError
-from fe_models.foundation.paths import near_file
+from fe_models.files.included import included_text
 
 __all__ = ["DeckBlock", "deck_blocks", "refuse_unread"]
 
-DEEPEST = 10  #: largest depth of nested include files
 _REFUSED = {
     "SYSTEM": "write the nodes in global coordinates",
     "NGEN": "write the generated nodes out",
@@ -116,17 +114,8 @@ def _with_input(where: str, line: _Line, of: _Files, files: tuple[Path, ...]) ->
             raise MeshError(f"{where}, line {line.number}: *INCLUDE: expected INPUT=file, got none")
         return
     path = of.folder / given
-    if path in files or len(files) >= DEEPEST:
-        raise MeshError(f"{where}, line {line.number}: *{keyword}: {path} includes itself, or files nest too deeply")
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise MeshError(
-            f"{where}, line {line.number}: *{keyword}, INPUT={given}: {path} cannot be read: "
-            f"{error.strerror or error}{near_file(path)}"
-        ) from error
-    of.included[str(path)] = sha256(data).hexdigest()
-    yield from _lines(where, data.decode("utf-8", "replace"), of, (*files, path))
+    text = included_text(f"{where}, line {line.number}: *{keyword}, INPUT={given}", path, files, of.included)
+    yield from _lines(where, text, of, (*files, path))
 
 
 _WITH_INPUT = ("NODE", "ELEMENT", "NSET", "ELSET", "AMPLITUDE", "BOUNDARY", "CLOAD", "DLOAD", "SURFACE", "EQUATION")

@@ -15,8 +15,16 @@ from fe_models.files.abaqus.layups import layers_of_block
 from fe_models.files.abaqus.materials import numbers, read_orientation, read_transform
 from fe_models.files.abaqus.thickness import read_nodal_thickness
 from fe_models.files.abaqus.uneven_box import uneven_box
-from fe_models.files.decks.deck import DeckMass, DeckSpring, LineSection, RodSection, ShellSection, SolidSection
-from fe_models.files.decks.spring_axes import as_triad, axes_along
+from fe_models.files.decks.deck import (
+    DeckMass,
+    DeckSpring,
+    LineSection,
+    RodSection,
+    ShellSection,
+    SolidSection,
+    as_triad,
+    axes_along,
+)
 from fe_models.foundation.arrays import MOTION_COMPONENTS, IntArray
 
 __all__ = ["ellipses_in_numbers", "read_section"]

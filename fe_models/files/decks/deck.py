@@ -8,7 +8,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from fe_models.files.decks.ledger import Ledger
+from fe_models.foundation.arrays import Array
 from fe_models.meshes.cells.raw_mesh import RawMesh
 
 __all__ = [
@@ -26,6 +29,8 @@ __all__ = [
     "ShellSection",
     "SolidSection",
     "Support",
+    "as_triad",
+    "axes_along",
 ]
 
 Vector = tuple[float, float, float]
@@ -148,6 +153,20 @@ class DeckSpring:
     damping: tuple[float, ...] | None = None
     triad: tuple[Vector, Vector, Vector] | None = None  #: axes of the spring as rows in basic axes; None: basic axes
     point: Vector | None = None  #: point at which the spring acts; None: midway between its nodes
+
+
+def axes_along(x: Array) -> Array:
+    """Return axes as rows, (3, 3), with the first along x; x must not be zero, the other two are arbitrary."""
+    x = x / np.linalg.norm(x)
+    y = np.cross(x, np.eye(3)[int(np.argmin(np.abs(x)))])
+    y = y / np.linalg.norm(y)
+    return np.stack([x, y, np.cross(x, y)])
+
+
+def as_triad(rows: Array) -> tuple[Vector, Vector, Vector]:
+    """Return axes, (3, 3) as rows, in the form of the triad of a `DeckSpring`."""
+    triad = [(float(a[0]), float(a[1]), float(a[2])) for a in rows]
+    return triad[0], triad[1], triad[2]
 
 
 @dataclass(frozen=True)

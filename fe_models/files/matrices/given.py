@@ -21,8 +21,8 @@ from fe_models.body.unit_check import BodyNumbers, hull_volume, implausible_numb
 from fe_models.elements.solids.body import scalar_mass_gram
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.digest import file_digest
 from fe_models.foundation.errors import BodyError
+from fe_models.foundation.paths import file_digest
 from fe_models.foundation.sparse.sparse_product import SymmetricProduct
 from fe_models.foundation.units import Units, unit_system
 from fe_models.foundation.words import nearest, quoted

@@ -11,8 +11,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
-from fe_models.foundation.digest import file_digest
 from fe_models.foundation.errors import ReportedError
+from fe_models.foundation.paths import file_digest
 from fe_models.foundation.tasks.installation import source_mark
 from fe_models.foundation.tasks.task_map import ProcessError, Progress
 from fe_models.foundation.tasks.workers import Workers, tasks_of

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.digest import file_digest
 from fe_models.foundation.documents.table import Table, Tabular
 from fe_models.foundation.errors import ReportedError
+from fe_models.foundation.paths import file_digest
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.tasks.campaign import Campaign, campaign_digest, open_task_journal
 from fe_models.foundation.tasks.workers import Workers

@@ -5,7 +5,7 @@ import os
 from functools import partial
 from pathlib import Path
 
-from fe_models.foundation.digest import file_digest
+from fe_models.foundation.paths import file_digest
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import ResultsError
 from floatframe.model.system import System

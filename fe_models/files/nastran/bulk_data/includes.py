@@ -1,15 +1,13 @@
 """Text of a Nastran deck including its include files, and its sections: main bulk data and superelements."""
 
 import re
-from hashlib import sha256
 from pathlib import Path
 
 from fe_models.errors import MeshError
-from fe_models.foundation.paths import near_file
+from fe_models.files.included import included_text
 
 __all__ = ["bulk_parts", "bulk_text"]
 
-DEEPEST = 10  #: largest depth of nested include files
 SECTION = re.compile(r"(?i)\s*BEGIN(?:\s+BULK)?(?:\s+SUPER\s*=?\s*(\d+))?\s*")
 
 
@@ -43,19 +41,12 @@ def bulk_text(where: str, path: Path, text: str, included: dict[str, str], files
                 statement += lines[k].partition("$")[0].strip()
             name = statement[7:].strip().strip("'\" =")
             other = path.parent / name
-            if other in files or other == path or len(files) >= DEEPEST:
-                raise MeshError(f"{where}: INCLUDE {name}: includes itself, or files nest too deeply")
-            try:
-                inner = other.read_bytes()
-            except OSError as error:
-                if is_first and any(each.lstrip().upper().startswith("CEND") for each in lines[k:]):
-                    k += 1  # statements above CEND control the program; their include files are not part of a body
-                    continue
-                raise MeshError(
-                    f"{where}: INCLUDE {name}: {other} cannot be read: {error.strerror or error}{near_file(other)}"
-                ) from error
-            included[str(other)] = sha256(inner).hexdigest()
-            out.append(bulk_text(where, other, inner.decode("utf-8", "replace"), included, (*files, path)))
+            if is_first and not other.is_file() and any(each.lstrip().upper().startswith("CEND") for each in lines[k:]):
+                k += 1  # statements above CEND control the program; their include files are not part of a body
+                continue
+            around = (*files, path)
+            inner = included_text(f"{where}: INCLUDE {name}", other, around, included)
+            out.append(bulk_text(where, other, inner, included, around))
         elif head.startswith("ENDDATA") and not is_first:
             break
         elif head.split()[:1] == ["BEGIN"]:

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.elements.beams.sections import round_properties
-from fe_models.files.decks.deck import DeckMass, DeckSpring, Vector
-from fe_models.files.decks.spring_axes import as_triad
+from fe_models.files.decks.deck import DeckMass, DeckSpring, Vector, as_triad
 from fe_models.files.nastran.bulk_data.cards import Card
 from fe_models.files.nastran.deck.model import ALONG, NastranModel
 from fe_models.foundation.arrays import Array

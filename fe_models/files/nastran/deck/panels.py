@@ -3,9 +3,8 @@
 import numpy as np
 
 from fe_models.assembly.constraints import weighted_motion
-from fe_models.files.decks.deck import DeckMass, DeckSpring
+from fe_models.files.decks.deck import DeckMass, DeckSpring, as_triad, axes_along
 from fe_models.files.decks.equations import Row
-from fe_models.files.decks.spring_axes import as_triad, axes_along
 from fe_models.files.nastran.bulk_data.cards import Card
 from fe_models.files.nastran.deck.model import ALL, NastranModel
 from fe_models.foundation.arrays import Array

@@ -4,8 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from fe_models.files.decks.deck import DeckMass, DeckMaterial, DeckSpring, ShellSection, SolidSection
-from fe_models.files.decks.spring_axes import as_triad, axes_along
+from fe_models.files.decks.deck import (
+    DeckMass,
+    DeckMaterial,
+    DeckSpring,
+    ShellSection,
+    SolidSection,
+    as_triad,
+    axes_along,
+)
 from fe_models.files.nastran.bulk_data.cards import Card
 from fe_models.files.nastran.deck.bars import BARS, read_bars, with_defaults
 from fe_models.files.nastran.deck.layups import (

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from fe_models.files.decks.deck import DeckSpring
-from fe_models.files.decks.spring_axes import as_triad, axes_along
+from fe_models.files.decks.deck import DeckSpring, as_triad, axes_along
 from fe_models.files.nastran.bulk_data.cards import Card
 from fe_models.files.nastran.deck.model import ALL, ALONG, NastranModel
 from fe_models.foundation.arrays import MOTION_COMPONENTS, Array

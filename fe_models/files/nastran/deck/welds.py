@@ -6,9 +6,8 @@ import numpy as np
 
 from fe_models.assembly.constraints import weighted_motion
 from fe_models.elements.beams.sections import round_properties
-from fe_models.files.decks.deck import DeckSpring
+from fe_models.files.decks.deck import DeckSpring, as_triad, axes_along
 from fe_models.files.decks.equations import Row
-from fe_models.files.decks.spring_axes import as_triad, axes_along
 from fe_models.files.nastran.bulk_data.cards import Card
 from fe_models.files.nastran.deck.layups import layers_of_card
 from fe_models.files.nastran.deck.model import ALL, NastranModel

@@ -203,7 +203,7 @@ def test_a_bush_with_length_needs_axes_unless_it_is_round(tmp_path, law, is_roun
 def test_a_missing_include_and_a_ring_of_them_are_refused(tmp_path):
     path = deck_of(tmp_path)
     (tmp_path / "nodes.bulk").write_text("INCLUDE 'nodes.bulk'\n")
-    with pytest.raises(ValueError, match=r"INCLUDE nodes\.bulk: includes itself"):
+    with pytest.raises(ValueError, match=r"INCLUDE nodes\.bulk: .*nodes\.bulk includes itself"):
         parse_deck(path)
     (tmp_path / "nodes.bulk").unlink()
     with pytest.raises(ValueError, match=r"INCLUDE nodes.bulk: .* cannot be read: No such file"):
