@@ -53,6 +53,7 @@ __all__ = [
     "gyroscopic",
     "inertia_rate",
     "modal_block",
+    "modal_matrix",
     "modal_term",
     "moved_inertia",
     "newton_block",
@@ -64,6 +65,12 @@ def block(types, t, which, size):
     """Return one constant matrix of a type of bodies as a view of the flat array of all matrices."""
     start = types.block0[t, which]
     return types.blocks[start : start + size]
+
+
+@view
+def modal_matrix(types, t, which, n):
+    """Return one constant matrix (n, n) of a type of bodies, which is not stored as a diagonal."""
+    return block(types, t, which, n * n).reshape((n, n))
 
 
 @view
@@ -146,11 +153,11 @@ def modal_term(types, t, n, which, x, out):
         for k in range(n):
             out[k] += diagonal[k] * x[k]
     else:
-        A = block(types, t, which, n * n)
+        A = modal_matrix(types, t, which, n)
         for k in range(n):
             total = 0.0
             for j in range(n):
-                total += A[k * n + j] * x[j]
+                total += A[k, j] * x[j]
             out[k] += total
 
 
@@ -409,7 +416,7 @@ def modal_block(types, t, n, which, factor, H):
         for k in range(n):
             H[6 + k, 6 + k] += factor * diagonal[k]
     else:
-        A = block(types, t, which, n * n)
+        A = modal_matrix(types, t, which, n)
         for k in range(n):
             for j in range(n):
-                H[6 + k, 6 + j] += factor * A[k * n + j]
+                H[6 + k, 6 + j] += factor * A[k, j]

@@ -5,7 +5,7 @@ Described in `floatframe.integrators.generalized_alpha`.
 
 import math
 
-from floatframe.engine.kernels.body import body_mass_product
+from floatframe.engine.kernels.body import block, body_mass_product, modal_matrix
 from floatframe.engine.kernels.compiler.compilation import inner, small
 from floatframe.engine.kernels.connections.gap import next_step, step_before_contact, take_ends
 from floatframe.engine.kernels.connections.user_force import resize_states
@@ -401,14 +401,15 @@ def are_aged(solver, second, first, of_rates):
 def take_stiffness(model, i, q, residual):
     """Subtract the elastic forces K q of body i from the modal residual."""
     n, t = model.bodies.n_q[i], model.bodies.kind[i]
-    K = model.body_types.blocks[model.body_types.block0[t, STIFFNESS] :]
-    is_diagonal = model.body_types.is_diagonal[t, STIFFNESS - MASS]
+    if model.body_types.is_diagonal[t, STIFFNESS - MASS]:
+        diagonal = block(model.body_types, t, STIFFNESS, n)
+        for k in range(n):
+            residual[k] -= diagonal[k] * q[k]
+        return
+    K = modal_matrix(model.body_types, t, STIFFNESS, n)
     for k in range(n):
-        if is_diagonal:
-            residual[k] -= K[k] * q[k]
-        else:
-            for j in range(n):
-                residual[k] -= K[k * n + j] * q[j]
+        for j in range(n):
+            residual[k] -= K[k, j] * q[j]
 
 
 @inner

@@ -211,10 +211,11 @@ def take_accelerated(model, work, m, n, y, mu):
     """Subtract from mu the effect of the body correction y on the rows of marker m through its acceleration."""
     c, o, motion = model.markers.connection[m], model.markers.a0[m], work.solver.motion
     R, P_a = work.state.R[model.markers.body[m]], work.connections.P_a[model.markers.accelerated[m]]
+    J_a = work.solver.J_a[6 * o : 6 * (o + n)].reshape((6, n))
     for r in range(6):
         total = 0.0
         for k in range(n):
-            total += work.solver.J_a[6 * o + r * n + k] * y[k]
+            total += J_a[r, k] * y[k]
         motion[r] = total
     for part in range(0, 6, 3):
         put(motion, part, turned(R, motion[part:]))

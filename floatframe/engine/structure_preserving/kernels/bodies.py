@@ -20,6 +20,7 @@ from floatframe.engine.kernels.body import (
     column,
     column_sum,
     coupling,
+    modal_matrix,
     tensor,
     tensor_sum,
     trace_less,
@@ -103,11 +104,11 @@ def products(discrete, t, n, q, which, out):
 @loops
 def matrix_product(discrete, t, which, n, x, out):
     """Write the product A x with a stored matrix A, (n, n)."""
-    A = block(discrete, t, which, n * n)
+    A = modal_matrix(discrete, t, which, n)
     for i in range(n):
         total = 0.0
         for j in range(n):
-            total += A[i * n + j] * x[j]
+            total += A[i, j] * x[j]
         out[i] = total
 
 
@@ -299,13 +300,13 @@ def end_rates(model, discrete, step, i):
     omega, x, Y = vector(step.w_1[u0 + 3 :]), step.w_1[u0 + 6 : u0 + 6 + n], step.vector[:n]
     Pi = momenta(model, discrete, step, t, n, step.q_1[q0 : q0 + n], omega, x, Y)
     turning = sub(Pi, vector(step.P_0[u0 + 3 :]))
-    F, E = block(discrete, t, FILTER, n * n), block(discrete, t, FREE_TURNING, 3 * n)
+    F, E = modal_matrix(discrete, t, FILTER, n), block(discrete, t, FREE_TURNING, 3 * n)
     for k in range(n):
         Y[k] -= step.P_0[u0 + 6 + k] + dot(column(E, n, k), turning)
     for k in range(n):
         rate = 0.0
         for j in range(n):
-            rate += F[k * n + j] * Y[j]
+            rate += F[k, j] * Y[j]
         x[k] -= 2.0 * rate
         omega = add(omega, scaled(2.0 * rate, column(E, n, k)))
     put(step.w_1, u0 + 3, omega)
@@ -357,12 +358,11 @@ def body_inertia(model, discrete, step, i):
 @loops
 def subtract_elastic(discrete, step, t, n, q_mean, dq, N):
     """Subtract elastic forces K q and damping forces D dq/h from the modal forces, with numerical dissipation in q."""
-    K = block(discrete, t, STIFFNESS, n * n).reshape((n, n))
-    D, q = block(discrete, t, DAMPING, n * n).reshape((n, n)), step.vector
+    K, D, q = modal_matrix(discrete, t, STIFFNESS, n), modal_matrix(discrete, t, DAMPING, n), step.vector
     for k in range(n):
         q[k] = q_mean[k]
     if discrete.is_filtered:
-        X = block(discrete, t, STIFFNESS_FILTER, n * n).reshape((n, n))
+        X = modal_matrix(discrete, t, STIFFNESS_FILTER, n)
         for k in range(n):
             for j in range(n):
                 q[k] += X[k, j] * dq[j]

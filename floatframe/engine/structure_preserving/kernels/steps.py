@@ -3,7 +3,7 @@
 Described in `floatframe.integrators.energy_momentum`, `floatframe.integrators.variational`.
 """
 
-from floatframe.engine.kernels.body import block
+from floatframe.engine.kernels.body import modal_matrix
 from floatframe.engine.kernels.compiler.compilation import inner, kept_entry
 from floatframe.engine.kernels.compiler.structure import converter
 from floatframe.engine.kernels.connections.contact import contact_gap
@@ -91,10 +91,10 @@ def work_of_dampers(model, discrete, step):
     total = 0.0
     for i in range(model.bodies.kind.shape[0]):
         t, n, q0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i]
-        D = block(discrete, t, DAMPING, n * n)
+        D = modal_matrix(discrete, t, DAMPING, n)
         for k in range(n):
             for j in range(n):
-                total += step.dq[q0 + k] * D[k * n + j] * step.dq[q0 + j]
+                total += step.dq[q0 + k] * D[k, j] * step.dq[q0 + j]
     return total / step.h
 
 
