@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fe_models.foundation.documents.plot_axes import log_frequencies
 from floatframe.errors import ResultsError
 from floatframe.files.signals.octaves import nominal_frequency
 from floatframe.files.signals.orders import SpectralMap
@@ -37,7 +38,7 @@ def plot_spectrum(spectrum: Spectrum, ax: "Axes | None" = None) -> "Axes":
         inside = spectrum.frequencies > 0
         ax.plot(spectrum.frequencies[inside], spectrum.values[inside], linewidth=1.0)
         if spectrum.kind == "power spectral density":
-            ax.set_xscale("log")
+            log_frequencies(ax)
             log_from(ax, float(spectrum.values[inside].max(initial=0.0)))
         else:
             ax.set_ylim(bottom=0)

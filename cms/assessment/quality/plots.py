@@ -7,6 +7,7 @@ import numpy as np
 
 from cms.assessment.quality.of_reduction.deformation import DeformationError
 from cms.assessment.quality.reference.port_model import FrequencyResponse
+from fe_models.foundation.documents.plot_axes import log_frequencies
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,6 +44,7 @@ def plot_frf(
         ax.loglog(response.frequencies, np.abs(values[:, output, input]), label=name, **style(k))
     first = next(iter(curves.values()))
     ax.set_ylabel(f"|{first.outputs[output]} / {first.inputs[input]}|")
+    log_frequencies(ax)
     return finished(ax, "frequency [Hz]")
 
 
@@ -61,6 +63,7 @@ def plot_phase(
         ax.semilogx(response.frequencies, np.degrees(np.angle(values[:, output, input])), label=name, **style(k))
     ax.set_yticks([-180, -90, 0, 90, 180])
     ax.set_ylabel("phase [deg]")
+    log_frequencies(ax)
     return finished(ax, "frequency [Hz]")
 
 

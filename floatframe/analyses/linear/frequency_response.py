@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.documents.plot_axes import log_frequencies
 from fe_models.foundation.documents.table import Table, Tabular
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
@@ -122,6 +123,7 @@ class FrequencyResponse(Tabular):
         ax.set_yticks(90 * np.arange(first, last + 1, max(1, (last - first) // 6)))
         ax.grid(which="major", alpha=0.4)
         ax.set_xlabel("frequency [Hz]")
+        log_frequencies(ax)
         ax.set_xlim(hertz[0], hertz[-1])
         if still:
             figure.suptitle(f"no response: {', '.join(still)}", fontsize="small", color="0.4")
