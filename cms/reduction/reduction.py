@@ -54,6 +54,7 @@ from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.tall.columns import in_memory, inner, rows_times
 from fe_models.foundation.tall.on_disk import release, zeros_like
+from fe_models.foundation.threads import one_blas_thread
 
 __all__ = ["assembled", "reduce"]
 
@@ -185,7 +186,7 @@ def reduce(
 
 def errors_of(source: FEBody | Families, modes: ModeSet, finished: FinishedBasis) -> ErrorEstimates:
     """Return the estimated errors, from a factorisation of its own if the source has none."""
-    with families_of(source) as families:
+    with families_of(source) as families, one_blas_thread():
         return error_estimates(families, modes, basis_of_finished(families, finished))
 
 

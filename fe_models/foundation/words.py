@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Iterable
 from difflib import get_close_matches
+from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
+if TYPE_CHECKING:
+    from fe_models.foundation.arrays import Array
 
 __all__ = ["damage", "nearest", "node_list", "quoted", "shortened"]
 
@@ -31,7 +32,7 @@ def shortened(text: str, longest: int = LONGEST) -> str:
     return text if len(text) <= longest else f"{text[: longest - 3]}..."
 
 
-def node_list(nodes: Iterable[int], positions: NDArray[np.float64], called: Callable[[int], str] = str) -> str:
+def node_list(nodes: Iterable[int], positions: "Array", called: Callable[[int], str] = str) -> str:
     """Return 'node 3 at (0, 1, 2.5), node 7 at (…)' for a message; `called` returns the user's name of a node."""
     return ", ".join(f"node {called(n)} at ({', '.join(f'{x:.6g}' for x in positions[n])})" for n in nodes)
 
