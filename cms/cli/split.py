@@ -1,4 +1,4 @@
-"""`cms split`: the job of one body becomes jobs of its parts, and a system that joins them."""
+"""`cms split`: write jobs for the parts of one body, and a system that joins the parts."""
 
 import json
 import logging

@@ -8,7 +8,7 @@ from fe_models.foundation.arrays import Array
 __all__ = ["elastic_eigenvectors", "turn_to_diagonal"]
 
 INDEPENDENT = 1e-14  #: smallest eigenvalue of the norm W, scaled to a unit diagonal, of an independent direction
-MASSLESS = 1e-12  #: modal mass times omega_1² of a shape of unit W-length, below which the shape is static
+MASSLESS = 1e-12  #: modal mass times omega_1² below which a shape of unit W-length is static
 #: largest ratio of omega² within a band in step (4); stiff modes cause a rounding error of 1e-10 in the softest
 BAND = 1e6
 

@@ -26,7 +26,7 @@ class Kind:
     format: str  #: name of the format in the seal and in messages, one word
     version: int  #: version of the format; a reader rejects later versions
     error: type[Exception]  #: error class; its text is written for the user
-    writer: str  #: command or function that writes such files, for messages
+    writer: str  #: command or function that writes such files; messages name it
 
 
 def seal_of(file: IO[bytes], kind: Kind) -> bytes:

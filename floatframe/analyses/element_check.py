@@ -109,7 +109,7 @@ def check_element(system: System, name: str, state: State | None = None) -> Elem
 
 
 def values_of(placed: PlacedLaw, inputs: Array) -> Array:
-    """Return all outputs of the law, called in the same way as by the engine."""
+    """Call the law as the engine does, and return all its outputs."""
     n_all = placed.n_out + len(placed.law.outputs)
     values = called_law(placed.value.address, placed.head, np.asarray(placed.law.data), inputs[None], n_all)[0]
     raise_errors_of([placed.value])

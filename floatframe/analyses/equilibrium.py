@@ -278,7 +278,10 @@ def steady_rotation(
     def followed(
         state: State, w: Array, *, by_newton: bool = False, runs_down: bool = False
     ) -> "Equilibrium | FlowFailure":
-        """Follow the flow from a state, or Newton's method alone; with `runs_down`, forces may slow the rotation."""
+        """Return the steady rotation found from a state by the flow or, with `by_newton`, by Newton's method alone.
+
+        With `runs_down`, the forces that slow the rotation need no balance, but they must be small.
+        """
         tau, last, progress, has_stood = np.inf if by_newton else 0.0, np.inf, Progress(), False
         for iteration in range(max_iterations + 1):
             state, u_dot = turning(compiled, state, omega, center)
@@ -553,7 +556,7 @@ def rounding_of(compiled: CompiledSystem, parts: Linearized, state: State) -> Ar
 
 
 def rounding_of_inertia(model: Model, mass: tuple[Array, ...], state: State, omega: Array, center: Array) -> Array:
-    """Return rounding errors of a rotation's inertia forces due to positions, (n_u,); large far from the origin."""
+    """Return errors of a rotation's inertia forces caused by rounded positions, (n_u,); large far from the origin."""
     forces = np.zeros(len(state.u))
     for i, block in enumerate(mass):
         u = slice(int(model.bodies.u0[i]), int(model.bodies.u0[i + 1]))

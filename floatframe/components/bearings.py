@@ -119,10 +119,10 @@ class Bearing(Element):
         cosine = float((placed.A[0] @ self.axis) @ (placed.A[1] @ self.shaft_axis))
         if cosine < LEAST_COSINE:
             raise ModelError(
-                f"element {self.name!r}: expected the axis of the shaft within "
-                f"{np.degrees(np.arccos(LEAST_COSINE)):.3g}° of that of the bearing as placed, got "
-                f"{np.degrees(np.arccos(max(cosine, -1.0))):.3g}°; give axis in "
-                "the axes of marker_a, and shaft_axis in those of marker_b"
+                f"element {self.name!r}: expected an angle of at most "
+                f"{np.degrees(np.arccos(LEAST_COSINE)):.3g}° between shaft and bearing at assembly, got "
+                f"{np.degrees(np.arccos(max(cosine, -1.0))):.3g}°; give the components of axis in "
+                "marker_a, and the components of shaft_axis in marker_b"
             )
         y_axis = np.cross(self.axis, self.x_axis)
         return ElementLaw(

@@ -175,7 +175,7 @@ class System:
                 raise ModelError(
                     f"{where}: flexible body {body.name!r} is in units {body.reduced.units.name!r}, but "
                     f"the system in {self.units.name!r}; give the system the units of the body, or read the body in "
-                    f"those of the system: cms.read(file, units={self.units.name!r})"
+                    f"the units of the system: cms.read(file, units={self.units.name!r})"
                 )
 
     def summary(self) -> Summary:

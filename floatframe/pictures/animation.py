@@ -323,7 +323,10 @@ def interface_path(motion: BodyMotion, interface: ReducedInterface, magnificatio
 
 
 def trail(path: Array, rows: IntArray) -> Lines:
-    """Return the path of a point, (n_t, 3), up to each frame, one row each; later points coincide with the last one."""
+    """Return the lines that show, in each frame, the path of a point, (n_t, 3), up to the time of the frame.
+
+    All frames have the same number of points: later points of the path are placed at the point of the frame.
+    """
     kept = np.unique(np.r_[rows, np.arange(rows[0], rows[-1], max(len(path) // TRAIL_POINTS, 1))])
     points = path[np.minimum(kept[None, :], rows[:, None])]
     segments = np.stack([np.arange(len(kept) - 1), np.arange(1, len(kept))], axis=1)

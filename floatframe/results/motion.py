@@ -165,7 +165,7 @@ class Motion(Tabular, Trajectory):
 @frozen_copies
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MovedBody(BodyMotion):
-    """Motion of a body in a motion, with points on it."""
+    """Motion of one body of a system, and of points on the body."""
 
     motion: Motion
     name: str

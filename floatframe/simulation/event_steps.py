@@ -87,7 +87,7 @@ def same(memory: Memory) -> Memory:
 
 
 def past_rows(work: Work, n_steps: int, t0: float, h: float, first: int) -> Rows:
-    """Return rows that contain only the times and the stored angles after each of n_steps steps."""
+    """Return one row after each of n_steps steps, with the time and the stored angles only."""
     empty = Rows(*(np.zeros(0) for _ in Rows._fields))
     times: Array = t0 + h * np.arange(first + 1, first + n_steps + 1, dtype=float)
     return empty._replace(t=times, angle=work.past.memory.angle[:n_steps])

@@ -184,7 +184,8 @@ def require_switched(where: str, coupler: CoordinateCoupler, *, is_first_on: boo
         )
     if is_first_on and coupler.engaged:
         raise ModelError(
-            f"{where}: coupler {coupler.name!r} is switched on, but it is engaged at the start; set engaged = false"
+            f"{where}: an event switches coupler {coupler.name!r} on, but it is already engaged at the start; "
+            "set engaged = false"
         )
 
 

@@ -100,9 +100,9 @@ def frequency_words(
 
 
 def highest_frequencies(system: System, t: Array) -> Iterator[tuple[str, float]]:
-    """Yield the highest frequencies of functions of time at times t, (n_t,) [1/s], with their paths in the system.
+    """Yield, for each source, its path in the system and its highest frequency [1/s] over the times t, (n_t,).
 
-    The sources are sines in functions of time, expressions of time alone, and the method `frequencies` of elements.
+    Sources are sines in functions of time, expressions of time alone, and the method `frequencies` of elements.
     """
     for each in functions_of_time(system):
         function = each.function

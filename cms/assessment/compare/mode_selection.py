@@ -114,7 +114,7 @@ def select_modes(
 
 
 class _Judge(Protocol):
-    """Error measure, prepared for one body and band."""
+    """Error measure of mode sets, prepared for one body and one band."""
 
     words: str  #: description of the measure
 

@@ -32,7 +32,8 @@ __all__ = ["ENTRIES", "GROUPS", "Entry", "Group", "dataset_of", "in_units", "req
 NONE, MASS, LENGTH, RATE = Dimensions(), Dimensions(1), Dimensions(0, 1), Dimensions(0, 0, -1)
 SHAPE, TURN = Dimensions(-0.5), Dimensions(-0.5, -1)  #: dimensions of translation and rotation per unit of q
 VOLUME = Dimensions(0, 3)
-SIZES = {"n_q": "n_modes", "n_kept": "n_nodes"}  #: attribute of the file with a size; other sizes are those of a group
+#: attributes of the root that store sizes; every other size belongs to the group of its datasets
+SIZES = {"n_q": "n_modes", "n_kept": "n_nodes"}
 
 
 # datasets -------------------------------------------------------------------------------------------------------------

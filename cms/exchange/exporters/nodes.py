@@ -54,7 +54,7 @@ def interface_nodes(body: ReducedBody) -> NodeList:
 
 
 def all_nodes(body: ReducedBody) -> NodeList:
-    """Return the kept nodes with their numbers in the user's mesh, then reference points that are not kept nodes.
+    """Return the kept nodes, numbered as in the user's mesh, followed by reference points that are not kept nodes.
 
     If these numbers are missing or repeated, nodes are numbered 1, 2, ... (`user_numbers`). Rotations are known for
     members and reference nodes of rigid interfaces, and for nodes that are kept with rotations.

@@ -215,7 +215,9 @@ def require_plausible(where: str, reduced: ReducedBody, accept: tuple[str, ...])
     """Raise `ForeignBodyError` if size, density or first frequency is implausible in these units."""
     for is_error, text in unit_findings(reduced):
         if is_error and "units" not in accept:
-            raise ForeignBodyError(f'{where}: {text}; name the units of the file, or accept = ["units"] if it is meant')
+            raise ForeignBodyError(
+                f'{where}: {text}; name the units of the file, or confirm the values by accept = ["units"]'
+            )
         log.warning("%s: %s", where, text)
 
 

@@ -187,8 +187,8 @@ def _sew(where: str, gmsh: ModuleType, shapes: list[tuple[int, int]]) -> None:
     solids = gmsh.model.getEntities(3)
     if len(solids) != 1 or borders or loose or not _is_one_shell(gmsh) or not _volume(gmsh) > 0:
         raise MeshError(
-            f"{where}: it holds {len(faces)} faces and no solid, and they do not close to one ({len(borders)} edges "
-            f"are open); {advice}"
+            f"{where}: it holds {len(faces)} faces and no solid, and the faces do not close to a single solid "
+            f"({len(borders)} edges are open); {advice}"
         )
 
 

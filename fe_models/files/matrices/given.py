@@ -248,7 +248,7 @@ def require_units(body: FEBody, *, accept: tuple[str, ...]) -> None:
     )
     for is_error, text in implausible_numbers(body.units, numbers):
         if is_error and "units" not in accept:
-            raise BodyError(f'body {body.name!r}: {text}; or accept = ["units"] if it is meant')
+            raise BodyError(f'body {body.name!r}: {text}; or confirm the values by accept = ["units"]')
         log.warning("body %r: %s", body.name, text)
 
 

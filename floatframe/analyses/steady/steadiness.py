@@ -123,7 +123,7 @@ def require_steady(
 
 
 def carrier_of(compiled: CompiledSystem, state: State, omega: Array) -> Carrier:
-    """Return the common motion of the bodies in a state that rotates with omega.
+    """Return the steadily moving frame that carries all bodies of a state; omega is its angular velocity.
 
     Raises
     ------

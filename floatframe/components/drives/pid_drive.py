@@ -27,7 +27,7 @@ CONTROLLER = 12  #: index in the data of the controller
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class PidDrive(Element):
-    """The output of a PID controller as a torque about, or a force along, the axis of marker a, acting on b and on a.
+    """A drive with a PID controller: a torque about, or a force along, the axis of marker a; it acts between a and b.
 
     `controlled` is "angle" (zero as assembled, counted through full turns) or "speed" about the axis, with a torque, or
     "distance" of marker b from marker a along the axis or its "rate", with a force. With `time_constant`, the torque or

@@ -261,7 +261,9 @@ class MagicFormulaTyre(Element):
                 f"side force along positive slip angles, contrary to {self.convention!r}; is it a file of {other!r}?"
             )
         if (self.relaxation_x is None) != (self.relaxation_y is None):
-            raise ModelError(f"{where}: expected relaxation_x and relaxation_y, or neither (then the file's)")
+            raise ModelError(
+                f"{where}: expected both relaxation_x and relaxation_y, or neither to use the values of the tyre file"
+            )
         for key in ("settling_time", "relaxation_x", "relaxation_y"):
             if getattr(self, key) is not None:
                 object.__setattr__(self, key, number(f"{where}: {key}", getattr(self, key), at_least=0.0))

@@ -24,7 +24,7 @@ REMEDY = "remove it, and include its forces along the rates in the input force"
 
 
 def model_terms(system: System, parameters: Sequence[str] = ()) -> tuple[RelativeModel, TreeTerms]:
-    """Return the recursive model of a system without its joint forces, and its tree as terms with these forces.
+    """Return the recursive model of a system without joint forces, and the terms of its tree, which include them.
 
     Raises
     ------

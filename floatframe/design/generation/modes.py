@@ -32,7 +32,7 @@ ROUNDING = 1e-14
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """Modal coordinates of a body and their moments in its node frame; arrays contain constant terms."""
+    """Modal coordinates of a body, and the moments of its modes in the node frame as constant terms."""
 
     n: int
     x0: int  #: index of the first mode among the positions

@@ -345,7 +345,7 @@ def of_motion(
 def require_columns_of_states(
     own: Neighbour, wanted: tuple[OutputRequest, ...], columns: tuple[Column, ...], points: Sequence[Point]
 ) -> None:
-    """Raise `ModelError` if a column is not a function of the state at one time, such as a spectrum."""
+    """Raise `ModelError` if a column, such as a spectrum, is not a function of the state at one time."""
     beside, alone = values_at(own, columns, points[-2:])[0][-1], values_at(own, columns, points[-1:])[0][0]
     for j, each in enumerate(wanted):
         if not abs(beside[j] - alone[j]) <= 1e-9 * max(abs(alone[j]), abs(beside[j])):

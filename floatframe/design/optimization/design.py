@@ -81,7 +81,7 @@ class Design:
         return tuple(dict.fromkeys(q.analysis for q in self.quantities))
 
     def study_of(self, analysis: str) -> Study:
-        """Return the study of one analysis with its outputs."""
+        """Return the study of one analysis, with only the outputs of this analysis."""
         return replace(
             self.study, analysis=analysis, outputs=tuple(q.output for q in self.quantities if q.analysis == analysis)
         )

@@ -45,7 +45,7 @@ class DiscreteSystem:
         return np.array([k for c in self.connections for k in c.held], dtype=np.int64)
 
     def is_driven(self, connection: Connection, k: int) -> bool:
-        """Whether constraint k of a connection does the work of a prescribed motion."""
+        """Whether a prescribed motion does work through constraint k of a connection."""
         line = line_of(self.model, connection.number)
         is_driven_line = line >= 0 and self.model.lines.row[line] >= 0
         return bool(is_driven_line or self.model.rows.motion[k] >= 0)

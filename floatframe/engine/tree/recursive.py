@@ -97,7 +97,7 @@ class RelativeModel:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Names of the positions: joint (or free body) and coordinate, or body and mode."""
+        """Names of the positions: each names a joint (or free body) and its coordinate, or a body and its mode."""
         return self.named(is_position=True)
 
     @cached_property

@@ -125,8 +125,7 @@ def times_of(
     if found_unit.quantity != "time":
         raise SignalError(
             f"{path}: column {quoted(table.names[column])}, taken as the time, is in {unit} ({found_unit.quantity}); "
-            f"name "
-            "the column with the time, or give the rate of a table without times"
+            "name the column that holds the times, or give the rate if the table has no times"
         )
     notes = [] if found_unit.factor == 1.0 else [f"times converted from {unit} to s"]
     return table.values[:, column] * found_unit.factor, column, notes

@@ -50,7 +50,7 @@ def chassis_lines() -> list[tuple[str, str, str]]:
 
 
 def chassis_tables(kart: Kart, *, has_axle: bool = True) -> dict[str, str]:
-    """Return the tables of nodes and lines of `chassis.toml`, by file name; optionally without the rear axle."""
+    """Return the tables of nodes and lines of `chassis.toml` by file name, with or without the rear axle."""
     of_axle = ("axle", "bearing_left", "bearing_right", "rear_left", "rear_right")
     nodes = {name: place for name, place in chassis_nodes(kart).items() if has_axle or name not in of_axle}
     number = {name: k + 1 for k, name in enumerate(nodes)}

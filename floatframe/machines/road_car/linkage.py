@@ -32,7 +32,7 @@ class CornerPlace:
     R: Array  #: rotation of the upright relative to its design position, (3, 3)
     seat: Array  #: lower end of the spring, (3,) [m]
     jack: Array  #: lower end of the cylinder, (3,) [m]
-    lower_angle: float  #: of the lower wishbone about its hinge, from front to rear [rad]
+    lower_angle: float  #: rotation of the lower wishbone about its hinge axis, which points to the rear [rad]
     spring: float  #: length [m]
     cylinder: float  #: length [m]
 

@@ -11,7 +11,8 @@ from fe_models.foundation.arrays import MOTION_COMPONENTS, Array
 
 __all__ = ["check_interface_motions", "check_interface_places", "check_rigid_interfaces", "missing_motions"]
 
-MISSING = 1e-7  #: singular value of scaled interface motions divided by the largest; below it, a motion is missing
+#: ratio of a singular value of the scaled interface motions to the largest one, below which a motion is missing
+MISSING = 1e-7
 
 
 def check_rigid_interfaces(reduced: ReducedBody) -> QualityRecord:

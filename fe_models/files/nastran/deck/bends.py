@@ -211,7 +211,7 @@ def _flexibility(section: _Bend, E: float, G: float, R: float, angle: float) -> 
 def _half(
     model: NastranModel, card: Card, arc: _Arc, middle: Array, R: float, side: int, added: float, node: str
 ) -> DeckMass:
-    """Return half of the line of centroids as a rigid body at end A (side -1) or B (1).
+    """Return one half of the line of centroids as a rigid body: the half at end A (side -1) or at end B (1).
 
     The centroid of an arc with radius R and half angle b is at R sin(b)/b. The mean squares of the coordinates along
     its middle direction and normal to it, from the centre, are R² (1/2 ± sin(2 b)/(4 b)).

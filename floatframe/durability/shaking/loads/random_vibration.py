@@ -250,7 +250,7 @@ def input_density(model: ShakenModel, test: RandomTest, acting: Mapping[int, tup
         a, b = (input_index(model, name, where) for name in (each.a, each.b))
         for name, k in ((each.a, a), (each.b, b)):
             if k not in acting:
-                raise ModelError(f"{where}: cross spectrum with {name!r}, which has no level")
+                raise ModelError(f"{where}: the cross spectrum names {name!r}, which has no level; give it a level")
         i, j = columns.index(a), columns.index(b)
         if i == j:
             raise ModelError(f"{where}: cross spectrum of {each.a!r} with itself")

@@ -202,7 +202,7 @@ def sweep_envelope(model: ShakenModel, k: int, test: SineTest, step: float = STE
 
 
 def sweep_times(test: SineTest, growth: float, step: float, where: str) -> tuple[Array, Array]:
-    """Return frequencies [Hz] and times [s] of the steps of a sweep, including the corners of its level."""
+    """Return frequencies [Hz] and times [s] of the steps of a sweep, including the corner frequencies of its level."""
     corners = test.level.frequencies[::-1] if test.downward else test.level.frequencies
     f, t = [np.array([corners[0]])], [np.zeros(1)]
     now = 0.0

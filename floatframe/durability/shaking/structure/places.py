@@ -109,7 +109,10 @@ def found_places(body: ReducedBody, each: Observed) -> list[Place]:
     """
     where, frame = f"shake: output {each.name!r}", body.frame
     if each.sensor is not None or each.body not in (None, body.name):
-        raise ModelError(f"{where}: sensors and other bodies exist only in a system; this is body {body.name!r} alone")
+        raise ModelError(
+            f"{where}: the test has no sensors and no other bodies, because it is of body {body.name!r} alone; observe "
+            "this body, or test a system"
+        )
     if each.interface is not None:
         interface = body.interface(each.interface)
         point = frame.origin + frame.axes @ interface.position

@@ -208,7 +208,7 @@ def nearest(tree, joints, i, s, w, out):
 
 @inner
 def move_joints(tree, joints):
-    """Write d and Q as their values at the beginning of the step, moved by the increments x."""
+    """Write d and Q: their values at the beginning of the step, moved by the increments x."""
     for i in range(tree.parent.shape[0]):
         d, left, right = vector(joints.d_start[i]), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         for k in range(tree.column0[i], tree.column0[i + 1]):

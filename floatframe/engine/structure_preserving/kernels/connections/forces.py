@@ -69,7 +69,7 @@ __all__ = ["bushing_load", "user_force_load", "user_state_residual"]
 
 @inner
 def axes_change(model, discrete, step, m, mean):
-    """Return the change of a marker's axes over the step; mean: their mean."""
+    """Return the change of a marker's axes over the step; mean: mean of the axes over the step."""
     rows = transposed(mean)
     x = change(model, discrete, step, m, unit(0), rows[0])
     y = change(model, discrete, step, m, unit(1), rows[1])
@@ -141,7 +141,7 @@ def bushing_load(model, discrete, step, c):
 
 @inner
 def put_states(model, work, step, c, first, part):
-    """Write the states of user force c into the inputs from `first` on, after a `part` of their change in the step.
+    """Write the states of user force c at the fraction `part` of the step to the inputs, from index `first` on.
 
     Return the number of inputs.
     """
