@@ -107,7 +107,12 @@ def register(app: typer.Typer, groups: Mapping[str, Mapping[str, Callable[..., N
     """Add commands under the headings of their groups in --help, in the order of work."""
     for heading, members in groups.items():
         for name, command in members.items():
-            app.command(name, rich_help_panel=heading)(command)
+            app.command(name, help=without_line_breaks(command.__doc__ or ""), rich_help_panel=heading)(command)
+
+
+def without_line_breaks(text: str) -> str:
+    """Return a docstring with one line for each paragraph, which the help then breaks to the width of the terminal."""
+    return "\n\n".join(" ".join(paragraph.split()) for paragraph in re.split(r"\n\s*\n", text.strip()))
 
 
 def commands(name: str, help: str, *, hints: Mapping[str, str] | None = None) -> typer.Typer:

@@ -681,6 +681,12 @@ def test_a_killed_run_leaves_the_old_file(folder):
     assert contents(folder) == before
 
 
+def test_a_paragraph_of_help_fills_its_lines():
+    """Line breaks of a docstring are not those of the terminal."""
+    told = CliRunner().invoke(app, ["reduce", "--help"], env={"COLUMNS": "200"}).stdout
+    assert "With several jobs or --workers, each job is a task; finished jobs are recorded" in told
+
+
 def test_help_names_the_commands_and_loads_nothing_heavy():
     script = PROGRAM[2].replace("main()", "\ntry: main()\nfinally: import sys; print(sorted(sys.modules))")
     result = subprocess.run([sys.executable, "-c", script, "--help"], env=ENVIRONMENT, capture_output=True, text=True)
