@@ -82,12 +82,12 @@ def error_estimates(families: Families, modes: ModeSet, basis: FreeBasis) -> Err
     loads, interface = interface_errors(families, basis)
     return ErrorEstimates(
         frequencies[:n],
-        errors.frequency,
-        errors.bound,
-        errors.shape,
+        four_digits(errors.frequency),
+        four_digits(errors.bound),
+        four_digits(errors.shape),
         loads,
-        without_rounding(interface),
-        without_rounding(energy_error(families.body, basis, families.Psi_H)),
+        four_digits(without_rounding(interface)),
+        four_digits(without_rounding(energy_error(families.body, basis, families.Psi_H))),
         METHOD,
         datetime.now(UTC).date().isoformat(),
     )
@@ -134,6 +134,11 @@ def smoothed_columns(families: Families, basis: FreeBasis, products: Products) -
         X = families.flexibility(F)
         F = products.M @ (X - combine(massive, inner(massive, products.M @ X)))
         yield X
+
+
+def four_digits(errors: Array) -> Array:
+    """Return errors with four digits, which do not depend on the number of threads; further ones mean nothing."""
+    return np.array([float(f"{error:.4g}") for error in errors])
 
 
 # static responses, which are known exactly ----------------------------------------------------------------------------

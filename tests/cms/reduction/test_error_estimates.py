@@ -18,6 +18,7 @@ from fe_models.files.matrices.given import body_from_matrices
 from tests.bodies import bar, box_mesh, distorted
 
 EXACT = 1e-7  #: relative error of a frequency that is rounding
+FOUR_DIGITS = 1 + 5e-4  #: largest factor of an error by its rounding to four digits
 EXACT_SETS = ("rubin", "normal")  #: sets that contain the free modes below their cutoff
 SETS = {
     "craig-bampton": {"n_modes": 9}, "craig-bampton-ir": {"n_modes": 6}, "rubin": {"n_modes": 7}, "guyan": {},
@@ -56,13 +57,13 @@ def test_an_estimate_is_below_the_true_error_and_near_it(body, exact, name, fram
     f = np.sqrt(exact[0]) / (2 * np.pi)
     true = errors.frequencies / f[: len(errors.frequencies)] - 1
     is_judged = true > EXACT
-    assert (errors.frequency <= true + EXACT).all()
+    assert (errors.frequency <= true * FOUR_DIGITS + EXACT).all()
     assert (errors.frequency >= 0.3 * true)[is_judged].all()
     assert np.quantile((errors.frequency / true)[is_judged], 0.1) >= 0.5 if is_judged.any() else name in EXACT_SETS
     nearest = np.abs(errors.frequencies[:, None] ** 2 / f**2 - 1).min(axis=1)
-    assert (nearest <= errors.bound + EXACT).all()
+    assert (nearest <= errors.bound * FOUR_DIGITS + EXACT).all()
     vibrating = modes.frequencies[~modes.is_static]
-    assert errors.frequencies[-1] <= vibrating.max(initial=0) or name in ("guyan", "krylov")
+    assert errors.frequencies[-1] <= (1 + EXACT) * vibrating.max(initial=0) or name in ("guyan", "krylov")
 
 
 def test_modes_that_a_set_contains_have_no_error(body):
@@ -144,7 +145,7 @@ def test_static_errors_are_those_of_a_dense_solution(body):
         u = np.zeros(body.n_dof)
         u[left] = la.solve(K[np.ix_(left, left)], f[left], assume_a="pos")
         d = u - Phi @ np.linalg.lstsq(Phi.T @ K @ Phi, Phi.T @ K @ u, rcond=1e-9)[0]
-        assert_allclose(errors.interface[k], np.sqrt((d @ K @ d) / (u @ K @ u)), rtol=1e-4)
+        assert_allclose(errors.interface[k], np.sqrt((d @ K @ d) / (u @ K @ u)), rtol=6e-4)
 
 
 def test_a_held_body_is_judged_as_it_is_held():
