@@ -76,7 +76,7 @@ def error_estimates(families: Families, modes: ModeSet, basis: FreeBasis) -> Err
     """
     frequencies = basis.frequencies()
     vibrating = modes.frequencies[~modes.is_static]
-    n = int((frequencies <= vibrating.max()).sum()) if len(vibrating) else min(JUDGED, len(frequencies))
+    n = int((frequencies <= (1 + EXACT) * vibrating.max()).sum()) if len(vibrating) else min(JUDGED, len(frequencies))
     n = min(max(n, 1), len(frequencies))
     errors = frequency_errors(families, basis, n)
     loads, interface = interface_errors(families, basis)
