@@ -41,6 +41,7 @@ __all__ = ["FrequencyErrors", "energy_error", "error_estimates", "frequency_erro
 
 JUDGED = 30  #: number of judged modes of a set without vibration modes, which has no cutoff
 RANDOM, STEPS, SEED = 6, 2, 20  #: number of random columns of (3), their steps of inverse iteration, and their seed
+NO_ERROR = 1e-10  #: estimated error of a frequency, below which it is rounding
 EXACT = 1e-7  #: bound b, below which a mode is exact within rounding
 INDEPENDENT = 1e-10  #: smallest eigenvalue of the scaled Gram matrix of independent corrections
 CLUSTER = 1e-3  #: relative gap of frequencies, below which shapes are judged as a common subspace
@@ -82,7 +83,7 @@ def error_estimates(families: Families, modes: ModeSet, basis: FreeBasis) -> Err
     loads, interface = interface_errors(families, basis)
     return ErrorEstimates(
         frequencies[:n],
-        four_digits(errors.frequency),
+        four_digits(np.where(errors.frequency < NO_ERROR, 0.0, errors.frequency)),
         four_digits(errors.bound),
         four_digits(errors.shape),
         loads,
