@@ -131,8 +131,8 @@ def known_terms(missing: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, .
 
 def body_of(content: Content) -> ReducedBody:
     """Return the body that a file describes; data that older versions lack are None or empty."""
-    content = without_version_1(content)
     require_layout(content)
+    content = without_version_1(content)
     contents = Contents(content)
     has, part = contents.has, lambda group: item_of(contents, group)
     units = part("/units")
@@ -170,11 +170,10 @@ def without_version_1(content: Content) -> Content:
     if content.version >= 2:
         return content
     datasets = {**content.datasets, "/frame/dofs": Dataset(np.zeros((0, 2), np.int64))}
-    attributes = dict(content.attributes)
-    for group, own in content.attributes.items():
-        if group.startswith("/interfaces/"):
-            Psi = np.asarray(datasets[f"{group}/Psi"].values)
-            attributes[group] = {**own, "has_rotation": int(own.get("kind") != "nodes" or bool(Psi[3:].any()))}
+    attributes, contents = dict(content.attributes), Contents(content)
+    for group in contents.numbered("/interfaces"):
+        has_rotation = contents.attribute(group, "kind", str) != "nodes" or contents.value(f"{group}/Psi")[3:].any()
+        attributes[group] = {**attributes[group], "has_rotation": int(has_rotation)}
     return replace(content, datasets=datasets, attributes=attributes)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from cms.body.error_estimates import ErrorEstimates
 from cms.body.invariants import NodalSums
 from cms.body.kept_points import KeptPoints
-from cms.body.modal_file.contents import Content, Dataset
+from cms.body.modal_file.contents import Content, Contents, Dataset
 from cms.body.recovery_table import RecoveryTable
 from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.body.source_columns import SourceColumns
@@ -267,8 +267,8 @@ def require_layout(content: Content) -> None:
 
     Datasets that are not in the table are ignored.
     """
-    root = content.attributes.get("/", {})
-    found: dict[tuple[str, str], int] = {("", name): int(root[key]) for name, key in SIZES.items() if key in root}
+    root = Contents(content)
+    found = {("", name): root.attribute("/", key, int) for name, key in SIZES.items()}
     for path, dataset in content.datasets.items():
         known = entry_of(path)
         if known is None:

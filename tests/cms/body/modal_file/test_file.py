@@ -476,6 +476,22 @@ def test_a_dataset_of_another_shape_or_kind_is_named(body, path, values, words):
         body_of(replace(content, datasets=datasets))
 
 
+@pytest.mark.parametrize(("sizes", "got"), [({"n_modes": "five"}, "'five'"), ({"n_modes": None}, "nothing")])
+def test_a_root_without_the_number_of_modes_is_refused(body, sizes, got):
+    content = content_of(body, VERSION)
+    root = {name: value for name, value in (content.attributes["/"] | sizes).items() if value is not None}
+    with pytest.raises(ModalFileError, match=f"attribute 'n_modes' of /: expected int, got {got}"):
+        body_of(replace(content, attributes={**content.attributes, "/": root}))
+
+
+def test_an_interface_of_version_1_without_shapes_is_refused(body):
+    content = content_of(body, 1)
+    attributes = {**content.attributes, "/interfaces/0": {"name": "left", "kind": "nodes"}}
+    datasets = {path: each for path, each in content.datasets.items() if path != "/interfaces/0/Psi"}
+    with pytest.raises(ModalFileError, match="dataset /interfaces/0/Psi is missing"):
+        body_of(replace(content, attributes=attributes, datasets=datasets))
+
+
 def test_units_follow_from_the_unit_system(path):
     with h5py.File(path) as file:
         units = {name: file[name].attrs["unit"].decode() for name in ("nodes/Phi", "moments/P", "modes/K", "moments/R")}
