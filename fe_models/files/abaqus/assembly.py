@@ -131,7 +131,10 @@ def _sorted(
     target, in_assembly = model, False
     for block in blocks:
         if block.keyword == "PART":
-            target = parts.setdefault(block.parameters.get("NAME", "").upper(), [])
+            name = block.parameters.get("NAME", "").upper()
+            if name in parts:
+                raise MeshError(f"{where}, {block.place}: *PART: a second part has the name {quoted(name)}; rename it")
+            target = parts[name] = []
         elif block.keyword == "INSTANCE":
             instances.append((block, []))
             target = instances[-1][1]

@@ -43,7 +43,7 @@ class DeckBlock:
         return [word for line in self.lines for word in (w.strip() for w in line.split(",")) if word]
 
 
-def deck_blocks(where: str, text: str, folder: Path, included: dict[str, str] | None = None) -> list[DeckBlock]:
+def deck_blocks(where: str, text: str, path: Path, included: dict[str, str] | None = None) -> list[DeckBlock]:
     """Return all blocks of a deck, including those of files referred to by *INCLUDE or INPUT=.
 
     Parameters
@@ -52,8 +52,8 @@ def deck_blocks(where: str, text: str, folder: Path, included: dict[str, str] | 
         Name of the deck, for messages.
     text
         Text of the deck.
-    folder
-        Folder to which the names of included files are relative.
+    path
+        The deck; names of included files are relative to its folder.
     included
         Dictionary that receives the sha256 of each included file, by path.
 
@@ -62,8 +62,8 @@ def deck_blocks(where: str, text: str, folder: Path, included: dict[str, str] | 
     MeshError
         If the text is no deck, or an included file is missing or includes itself.
     """
-    files = _Files(folder, {} if included is None else included)
-    blocks = list(_blocks(where, _lines(where, text, files, ())))
+    files = _Files(path.parent, {} if included is None else included)
+    blocks = list(_blocks(where, _lines(where, text, files, (path,))))
     if not blocks:
         raise MeshError(f"{where}: expected an Abaqus deck (keyword lines such as *NODE), got {text[:30]!r}")
     return blocks
@@ -84,7 +84,7 @@ class _Files:
 
 def _lines(where: str, text: str, of: _Files, files: tuple[Path, ...]) -> Iterator[_Line]:
     """Yield the non-empty lines of a deck, with the lines of included files at their place."""
-    name = files[-1].name if files else ""
+    name = files[-1].name if len(files) > 1 else ""
     pending = ""
     for number, raw in enumerate(text.splitlines(), start=1):
         line = raw.strip()

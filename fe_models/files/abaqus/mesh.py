@@ -163,7 +163,7 @@ def read_abaqus(path: Path, data: bytes) -> RawMesh:
     """
     where = f"mesh {path}"
     included: dict[str, str] = {}
-    blocks = deck_blocks(where, data.decode("utf-8", "replace"), path.parent, included)
+    blocks = deck_blocks(where, data.decode("utf-8", "replace"), path, included)
     refuse_unread(where, blocks)
     blocks, notes = only_part(where, blocks)
     counts = Counter(block.keyword for block in blocks)

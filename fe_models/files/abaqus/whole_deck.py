@@ -212,7 +212,7 @@ def read_abaqus_deck(path: Path, data: bytes, *, program: str = "calculix") -> D
     if program not in SOLID_RULES:
         raise MeshError(f"{where}: unknown program {program!r}; expected one of {', '.join(SOLID_RULES)}")
     included: dict[str, str] = {}
-    blocks = deck_blocks(where, data.decode("utf-8", "replace"), path.parent, included)
+    blocks = deck_blocks(where, data.decode("utf-8", "replace"), path, included)
     blocks = [replace(block, keyword=_SQUEEZED.get(block.keyword.replace(" ", ""), block.keyword)) for block in blocks]
     refuse_unread(where, blocks)
     flat = flat_assembly(where, blocks)

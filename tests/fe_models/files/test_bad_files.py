@@ -457,6 +457,7 @@ def test_abaqus_part_with_one_instance_reads_like_a_flat_deck(tmp_path):
             part_deck("*INSTANCE, NAME=a, PART=p\n*END INSTANCE\n*INSTANCE, NAME=b, PART=p\n*END INSTANCE\n"),
             "1 parts and 2 instances",
         ),
+        (f"*PART, NAME=p\n{TETRA}*END PART\n*PART, NAME=P\n*END PART\n", "a second part has the name 'P'"),
         (TETRA + "*INCLUDE, INPUT=more.inp\n", "more.inp cannot be read: No such file"),
         (TETRA + "*ELEMENT, TYPE=C3D4, INPUT=more.inp\n", "*ELEMENT, INPUT=more.inp"),
         (TETRA + "*INCLUDE, INPUT=rod.inp\n", "includes itself"),

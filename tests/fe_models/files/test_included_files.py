@@ -50,6 +50,20 @@ def test_included_files_are_on_record(tmp_path, name):
         }
 
 
+@pytest.mark.parametrize(("suffix", "include"), [(".inp", "*INCLUDE, INPUT={}.inp\n"), (".bdf", "INCLUDE '{}.bdf'\n")])
+def test_ten_files_may_include_each_other_and_eleven_may_not(tmp_path, suffix, include):
+    deck = FILES[f"box{suffix}"]
+    for k in range(10):
+        (tmp_path / f"{k}{suffix}").write_text(include.format(k + 1))
+    last = tmp_path / f"10{suffix}"
+    last.write_text("*NODE\n" * (suffix == ".inp") + deck["nodes.txt"] + deck["more.txt"])
+    assert len(read_mesh(tmp_path / f"0{suffix}").nodes) == 4
+    (tmp_path / f"11{suffix}").write_text(last.read_text())
+    last.write_text(include.format(11))
+    with pytest.raises(MeshError, match=rf"11{suffix} includes itself, or files nest too deeply"):
+        read_mesh(tmp_path / f"0{suffix}")
+
+
 def test_what_statements_above_cend_include_may_be_missing(tmp_path):
     """They run the program and describe no body; a file that bulk data include must be there."""
     grids = "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\n"
