@@ -53,7 +53,7 @@ def bytes_of(
             content = file.read(n)
     except OSError as failure:
         raise error(f"{where}: cannot be read: {failure.strerror or failure}") from failure
-    if not content.strip():
+    if not content or content.isspace():
         raise error(f"{where}: the file is empty")
     return content
 
