@@ -12,7 +12,7 @@ from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
-from fe_models.foundation.words import quoted
+from fe_models.foundation.words import number_list, quoted
 
 __all__ = ["KINDS_OF_ADDRESS", "Address", "FoundNodes"]
 
@@ -48,7 +48,7 @@ class FoundNodes:
 
     def description(self) -> str:
         """Describe the selected place, and its distance from the requested one."""
-        x = ", ".join(f"{value:.6g}" for value in self.place)
+        x = number_list(self.place)
         if len(self.rows) == 1 and self.asked == f"node {self.names[0]}":
             return f"{self.asked} at [{x}]"
         if len(self.rows) == 1:
@@ -176,7 +176,7 @@ class Address:
         if nearest > self.tolerance * size:
             near = []
             for row in order[:NEAREST]:
-                x = ", ".join(f"{value:.6g}" for value in frame.origin + frame.axes @ nodes[row])
+                x = number_list(frame.origin + frame.axes @ nodes[row])
                 near.append(f"node {reduced.node_name(int(row))} at [{x}], {away[row]:.3g} away")
             raise BodyError(
                 f"{where}: no kept node is at {self}, within {self.tolerance:g} of the body size {size:.4g}; "

@@ -21,6 +21,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.stages import Stages
+from fe_models.foundation.words import number_list
 
 __all__ = [
     "INTERRUPTED",
@@ -326,6 +327,5 @@ def stages(*, remaining: bool = False) -> Iterator[Stages]:
 
 
 def vector_words(values: Any, scale: float | None = None) -> str:
-    """Return numbers on one line; numbers within rounding of the scale (default: the largest) become 0."""
-    scale = max((abs(value) for value in values), default=0.0) if scale is None else scale
-    return "(" + ", ".join(f"{value if abs(value) > 1e-12 * scale else 0:.6g}" for value in values) + ")"
+    """Return numbers in brackets; numbers within rounding of the scale (default: the largest) become 0."""
+    return f"({number_list(values, scale)})"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cms.cli.arguments import ModalFile
-from cms.cli.console import guarded, output_path, print_table, say, stages
+from cms.cli.console import guarded, output_path, print_table, say, stages, vector_words
 
 if TYPE_CHECKING:
     from cms.body.reduced_body import ReducedBody
@@ -131,7 +131,7 @@ def print_modes(record: dict[str, Any]) -> None:
     at = f" at interface {frame['at']}" if frame["at"] else ""
     say(f"{n_dropped} redundant columns dropped; {n_rigid} rigid-body motions removed, which the frame carries.")
     say(f"Frame B: {frame['kind']}{at} ({FRAME_WORDS.get(frame['kind'], 'see docs/theory.md')});")
-    say(f"origin at ({', '.join(f'{x:.6g}' for x in frame['origin'])}) in mesh coordinates.\n")
+    say(f"origin at {vector_words(frame['origin'])} in mesh coordinates.\n")
     print_table(
         "Modes of the reduced body, the frame B held, by ascending frequency; static shapes last",
         ("mode>", "Hz>", "energy from"),

@@ -12,7 +12,7 @@ import scipy.sparse.linalg as sla
 
 from fe_models.body.freedom import MOTIONS, RigidForces, rigid_forces
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.words import node_list
+from fe_models.foundation.words import node_list, number_list
 
 __all__ = ["mistake_description", "support_description"]
 
@@ -125,8 +125,7 @@ def moved_description(K: sp.csc_array, nodes: Array, dofs: IntArray, forces: Rig
             return f": nodes {called(a)} and {called(b)} are exchanged; mend their order in nodes or in dofs"
     return (
         f": {len(wrong)} of them, {node_list(wrong[:3].tolist(), nodes, called)}; by K node {called(wrong[0])} belongs "
-        "to "
-        f"({', '.join(f'{x:.6g}' for x in place[wrong[0]])})"
+        f"to ({number_list(place[wrong[0]])})"
     )
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from fe_models.foundation.arrays import Array
 
-__all__ = ["damage", "nearest", "node_list", "quoted", "shortened"]
+__all__ = ["damage", "nearest", "node_list", "number_list", "quoted", "shortened"]
 
 LONGEST = 80  #: largest number of characters of a name or value in a message
 MOST_CHOICES = 40  #: largest number of names in a message
@@ -34,7 +34,14 @@ def shortened(text: str, longest: int = LONGEST) -> str:
 
 def node_list(nodes: Iterable[int], positions: "Array", called: Callable[[int], str] = str) -> str:
     """Return 'node 3 at (0, 1, 2.5), node 7 at (…)' for a message; `called` returns the user's name of a node."""
-    return ", ".join(f"node {called(n)} at ({', '.join(f'{x:.6g}' for x in positions[n])})" for n in nodes)
+    return ", ".join(f"node {called(n)} at ({number_list(positions[n])})" for n in nodes)
+
+
+def number_list(values: Iterable[float], scale: float | None = None) -> str:
+    """Return '0, 1, 2.5'; numbers within rounding of the scale (default: the largest of them) become 0."""
+    numbers = list(values)
+    scale = max(map(abs, numbers), default=0.0) if scale is None else scale
+    return ", ".join(f"{0 if abs(value) <= 1e-12 * scale else value:.6g}" for value in numbers)
 
 
 def quoted(value: object) -> str:

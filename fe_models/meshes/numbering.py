@@ -15,7 +15,7 @@ from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.errors import ArgumentError, BodyError
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import ArrayShape, checked_fields, frozen_copies
-from fe_models.foundation.words import nearest, quoted
+from fe_models.foundation.words import nearest, number_list, quoted
 
 __all__ = ["NONE", "NO_NUMBERS", "NamedSet", "Numbering", "node_place", "numbering_side_by_side"]
 
@@ -359,4 +359,4 @@ def overlap(numberings: Iterable[Numbering], name: str) -> bool:
 
 def node_place(numbering: Numbering, nodes: Array, row: int) -> str:
     """Describe a node by its name and position, for messages."""
-    return f"node {numbering.node_name(row)} at [{', '.join(f'{x:.6g}' for x in nodes[row])}]"
+    return f"node {numbering.node_name(row)} at [{number_list(nodes[row])}]"

@@ -11,7 +11,7 @@ from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, number_list
 from fe_models.meshes.boundary import CORNERS, boundary_facets, boundary_nodes, first_of_equal_rows
 from fe_models.meshes.line_mesh import LineMesh
 from fe_models.meshes.mesh import Mesh, used_nodes
@@ -389,7 +389,7 @@ def _diagonal(mesh: AnyMesh) -> float:
 
 
 def _text(vector: Vector | Array) -> str:
-    return f"({', '.join(f'{x:.6g}' for x in vector)})"
+    return f"({number_list(vector)})"
 
 
 def _some(numbers: IntArray) -> str:

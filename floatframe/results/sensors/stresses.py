@@ -11,7 +11,7 @@ from cms.errors import BodyError
 from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.foundation.arrays import STRESS_COMPONENTS, Array, GivenArrayOrNone, given
 from fe_models.foundation.records import checked_fields, frozen_copies
-from fe_models.foundation.words import nearest, quoted
+from fe_models.foundation.words import nearest, number_list, quoted
 from floatframe.errors import ModelError
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.checked_values import array_of_shape, number, unit_vector
@@ -260,7 +260,7 @@ class VonMisesSensor:
 def node_words(reduced: ReducedBody, row: int) -> str:
     """Return name and position (mesh axes) of a kept node as text."""
     x = reduced.frame.origin + reduced.frame.axes @ reduced.nodes[row]
-    return f"node {reduced.node_name(row)} at [{', '.join(f'{value:.6g}' for value in x)}]"
+    return f"node {reduced.node_name(row)} at [{number_list(x)}]"
 
 
 @frozen_copies
