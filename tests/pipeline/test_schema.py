@@ -76,6 +76,11 @@ def test_a_schema_refuses_what_the_reader_refuses(schemas):
     ("room", "table", "wrong"),
     [
         ("joints", {"type": "revolute", "body_a": "ground", "body_b": "rod", "axis": [0, 0, 1]}, {"lead": 1.0}),
+        (
+            "joints",
+            {"type": "revolute", "body_a": "ground", "body_b": "rod", "axis": [0, 0, 1], "motions": {"angle": 1}},
+            {"motions": {"angle": "1"}},
+        ),
         ("forces", {"type": "joint-force", "joint": "pin", "coordinate": "angle", "motor": 2}, {"motor": "2"}),
         ("sensors", {"type": "velocity", "body": "rod", "node": 3}, {"interface": "end"}),
         ("elements", {"type": "drives.pid", "marker_a": {"body": "rod"}, "controlled": "angle"}, {"contrlled": "x"}),

@@ -1,7 +1,8 @@
 """Axes of joints: a common direction of both markers, and its normals."""
 
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,7 +11,15 @@ from floatframe.errors import ModelError
 from floatframe.model.checked_values import unit_vector
 from floatframe.model.functions.time_functions import TimeFunction, constant
 
-__all__ = ["axis_in_b", "checked_axes", "checked_motions", "normals_of", "turning_frame"]
+__all__ = [
+    "GivenMotions",
+    "axis_in_b",
+    "checked_axes",
+    "checked_motions",
+    "given_motions",
+    "normals_of",
+    "turning_frame",
+]
 
 
 def normals_of(axis: Array) -> tuple[Array, Array]:
@@ -44,6 +53,23 @@ def checked_axes(joint: Any) -> None:
     for name in ("axis", "axis_b"):
         if getattr(joint, name, None) is not None:  # not every joint has an axis on B
             object.__setattr__(joint, name, unit_vector(f"joint {joint.name!r}: {name}", getattr(joint, name)))
+
+
+if TYPE_CHECKING:
+
+    class GivenMotions:
+        """A field that takes functions of time or numbers by coordinate, and holds functions."""
+
+        def __get__(self, joint: object, kind: object = None) -> Mapping[str, TimeFunction]: ...
+        def __set__(self, joint: object, value: Mapping[str, TimeFunction | float]) -> None: ...
+
+else:
+    GivenMotions = Mapping[str, TimeFunction | float]
+
+
+def given_motions() -> Any:
+    """Return the field `motions` of a joint, of the type `GivenMotions`; by default there are none."""
+    return field(default_factory=dict)
 
 
 def checked_motions(joint: Any) -> None:

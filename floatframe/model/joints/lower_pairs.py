@@ -3,8 +3,7 @@
 Evaluated in `floatframe.engine.kernels.joints.row_formulas`.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,8 +13,15 @@ from fe_models.foundation.units import LENGTH, Quantity
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Place
 from floatframe.model.checked_values import number
-from floatframe.model.functions.time_functions import TimeFunction
-from floatframe.model.joints.axis_frame import axis_in_b, checked_axes, checked_motions, normals_of, turning_frame
+from floatframe.model.joints.axis_frame import (
+    GivenMotions,
+    axis_in_b,
+    checked_axes,
+    checked_motions,
+    given_motions,
+    normals_of,
+    turning_frame,
+)
 from floatframe.model.joints.joint import SIDE_B, TURNS_IN_B, Column, Joint
 from floatframe.model.joints.rows import (
     DOT,
@@ -73,7 +79,7 @@ class RevoluteJoint(Joint):
     marker_b: Place
     axis: GivenArray = given((0.0, 0.0, 1.0))
     axis_b: GivenArrayOrNone = given(None)
-    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
+    motions: GivenMotions = given_motions()
 
     size = 6  #: components of the unknown wrench
     moment_b = MOMENT  #: index at which the moment on B starts in the wrench
@@ -123,7 +129,7 @@ class PrismaticJoint(Joint):
     marker_a: Place
     marker_b: Place
     axis: GivenArray = given((0.0, 0.0, 1.0))
-    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
+    motions: GivenMotions = given_motions()
 
     size = 9  #: components of the unknown wrench
     moment_b = MOMENT_B  #: index at which the moment on B starts in the wrench
@@ -185,7 +191,7 @@ class ScrewJoint(Joint):
     axis: GivenArray = given((0.0, 0.0, 1.0))
     axis_b: GivenArrayOrNone = given(None)
     lead: float = METRE
-    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
+    motions: GivenMotions = given_motions()
 
     size = 9  #: components of the unknown wrench
     moment_b = MOMENT_B  #: index at which the moment on B starts in the wrench
@@ -260,7 +266,7 @@ class CylindricalJoint(Joint):
     marker_b: Place
     axis: GivenArray = given((0.0, 0.0, 1.0))
     axis_b: GivenArrayOrNone = given(None)
-    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
+    motions: GivenMotions = given_motions()
 
     size = 9  #: components of the unknown wrench
     moment_b = MOMENT_B  #: index at which the moment on B starts in the wrench
@@ -351,7 +357,7 @@ class PlanarJoint(Joint):
     marker_b: Place
     axis: GivenArray = given((0.0, 0.0, 1.0))
     axis_b: GivenArrayOrNone = given(None)
-    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
+    motions: GivenMotions = given_motions()
 
     size = 9  #: components of the unknown wrench
     moment_b = MOMENT_B  #: index at which the moment on B starts in the wrench

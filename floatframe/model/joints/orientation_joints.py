@@ -3,8 +3,7 @@
 Evaluated in `floatframe.engine.kernels.joints.row_formulas`, `floatframe.engine.kernels.joints.constant_velocity`.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,8 +12,14 @@ from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Place
 from floatframe.model.checked_values import rotation_of
-from floatframe.model.functions.time_functions import TimeFunction
-from floatframe.model.joints.axis_frame import axis_in_b, checked_axes, checked_motions, normals_of
+from floatframe.model.joints.axis_frame import (
+    GivenMotions,
+    axis_in_b,
+    checked_axes,
+    checked_motions,
+    given_motions,
+    normals_of,
+)
 from floatframe.model.joints.joint import MOVES_IN_A, SIDE_B, Column, Joint
 from floatframe.model.joints.rows import (
     DOT,
@@ -149,7 +154,7 @@ class UniversalJoint(Joint):
     marker_b: Place
     axis: GivenArray = given((1.0, 0.0, 0.0))
     axis_b: GivenArray = given((0.0, 1.0, 0.0))
-    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
+    motions: GivenMotions = given_motions()
 
     size = 6  #: components of the unknown wrench
     moment_b = MOMENT  #: index at which the moment on B starts in the wrench

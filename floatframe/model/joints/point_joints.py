@@ -3,8 +3,7 @@
 Evaluated in `floatframe.engine.kernels.joints.row_formulas`.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,8 +12,7 @@ from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Place
 from floatframe.model.checked_values import number
-from floatframe.model.functions.time_functions import TimeFunction
-from floatframe.model.joints.axis_frame import checked_axes, checked_motions, normals_of
+from floatframe.model.joints.axis_frame import GivenMotions, checked_axes, checked_motions, given_motions, normals_of
 from floatframe.model.joints.joint import Joint
 from floatframe.model.joints.rows import DISTANCE, NO_MOMENT, ROD, SLIDE, SPAN, Row, RowCoordinate, arm_rows, slide_row
 
@@ -48,7 +46,7 @@ class PointOnLine(Joint):
     marker_a: Place
     marker_b: Place
     axis: GivenArray = given((0.0, 0.0, 1.0))
-    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
+    motions: GivenMotions = given_motions()
 
     size = 6  #: components of the unknown wrench
     moment_b = NO_MOMENT  #: index at which the moment on B starts in the wrench
@@ -92,7 +90,7 @@ class PointOnPlane(Joint):
     marker_a: Place
     marker_b: Place
     axis: GivenArray = given((0.0, 0.0, 1.0))
-    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
+    motions: GivenMotions = given_motions()
 
     size = 6  #: components of the unknown wrench
     moment_b = NO_MOMENT  #: index at which the moment on B starts in the wrench
@@ -136,7 +134,7 @@ class DistanceJoint(Joint):
     marker_a: Place
     marker_b: Place
     distance: float | None = None
-    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
+    motions: GivenMotions = given_motions()
 
     size = 4  #: components of the unknown wrench
     moment_b = NO_MOMENT  #: index at which the moment on B starts in the wrench

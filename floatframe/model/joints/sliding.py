@@ -3,8 +3,8 @@
 Evaluated in `floatframe.engine.kernels.joints.deformed_line`.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,8 +13,7 @@ from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker, Place
 from floatframe.model.checked_values import unit_vector
-from floatframe.model.functions.time_functions import TimeFunction
-from floatframe.model.joints.axis_frame import checked_motions
+from floatframe.model.joints.axis_frame import GivenMotions, checked_motions, given_motions
 from floatframe.model.joints.joint import Joint
 from floatframe.model.joints.rows import LINE, LINE_FREE, LINE_TURN, MOMENT, NO_MOMENT, Row, orientation_rows
 
@@ -61,7 +60,7 @@ class SlidingJoint(Joint):
     line: Sequence[str] = ()
     is_aligned: bool = False
     normal: GivenArrayOrNone = given(None)
-    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
+    motions: GivenMotions = given_motions()
 
     coordinates = ("distance",)
 
