@@ -200,12 +200,11 @@ def describe(model: type[BaseModel], detail: ErrorDetails, data: Any = None) -> 
     key = key_path(location)
     parent = table_at(model, location[:-1], data) if location else None
     fields = fields_of(parent) if parent is not None else {}
-    field = fields.get(str(location[-1])) if location else None
     if detail["type"] == "extra_forbidden":
         title = parent.model_config.get("title") if parent is not None else None
         kind = "" if title is None else f' of type "{title}"'
         return f"{key}: unknown key{kind}{nearest(str(location[-1]), fields)}"
-    expected = (field.description if field is not None else None) or "a table of keys"
+    expected = expected_at(model, location, data)
     if detail["type"] == "missing":
         return f"{key}: missing; expected {expected}"
     if detail["type"] == "value_error":
@@ -215,6 +214,18 @@ def describe(model: type[BaseModel], detail: ErrorDetails, data: Any = None) -> 
             f"{key} = {quoted_value(detail['input'])}: {text}" if shows_value else f"{key}: {text}".removeprefix(": ")
         )
     return f"{key} = {quoted_value(detail['input'])}: expected {expected}"
+
+
+def expected_at(model: type[BaseModel], location: Location, data: Any = None) -> str:
+    """Return the description of the key at a location, or of the nearest key around an item of a list or table."""
+    for n in range(len(location), 0, -1):
+        parent = table_at(model, location[: n - 1], data)
+        field = None if parent is None else fields_of(parent).get(str(location[n - 1]))
+        if field is not None and field.description:
+            return field.description
+        if table_at(model, location[:n], data) is not None:
+            break
+    return "a table of keys"
 
 
 def fields_of(model: type[BaseModel]) -> dict[str, FieldInfo]:

@@ -1,4 +1,4 @@
-"""Tables of the system file for inputs, [inputs.NAME], and outputs, [outputs.NAME], of the linearised system."""
+"""Tables of the system file for what is measured, watched and exchanged: sensors, events, FMUs, inputs and outputs."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -44,9 +44,6 @@ __all__ = [
 SensorSection = Annotated[DescribedSection, OneOf(SENSORS, "sensors.NAME", "sensor", is_measured=True)]
 
 
-# channel section ------------------------------------------------------------------------------------------------------
-
-
 # tables of the system file for events: [events.NAME] ------------------------------------------------------------------
 
 
@@ -86,7 +83,7 @@ class ForeignSection(Table):
 CosimulationSection = Annotated[AcceptedTable, ObjectOf(Coupling, "cosimulation")]
 
 
-# channel section ------------------------------------------------------------------------------------------------------
+# tables of the system file for inputs and outputs: [inputs.NAME], [outputs.NAME] --------------------------------------
 
 
 WAYS = {  # keys that belong together, by the key that identifies the group

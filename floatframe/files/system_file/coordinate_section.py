@@ -3,10 +3,11 @@
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BeforeValidator, Field, StringConstraints, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from fe_models.foundation.toml_file import Matrix3, Table, Vector3, choice
 from floatframe.errors import ModelError
+from floatframe.files.system_file.keys import Name
 from floatframe.files.system_file.place_key import PlaceOnBody, marker_of
 from floatframe.model.bodies.coordinates import (
     AxialAngle,
@@ -18,7 +19,6 @@ from floatframe.model.bodies.coordinates import (
 
 __all__ = ["CoordinateSection", "NamedCoordinate", "of_joint"]
 
-Name = Annotated[str, StringConstraints(min_length=1)]
 COORDINATES = {"axial-distance": AxialDistance, "axial-angle": AxialAngle, "point-distance": PointDistance}
 
 

@@ -32,7 +32,7 @@ from cms.body.address import Address
 from fe_models.foundation.toml_file import Matrix3, Table, choice, existing_file, is_no_number
 from floatframe.errors import ModelError, SignalError
 from floatframe.files.system_file.coordinate_section import CoordinateSection, NamedCoordinate
-from floatframe.files.system_file.keys import Name
+from floatframe.files.system_file.keys import Name, tuple_of_list
 from floatframe.files.system_file.place_key import (
     TOLERANCE_WORDS,
     MeasuredPlace,
@@ -42,7 +42,7 @@ from floatframe.files.system_file.place_key import (
     marker_of,
 )
 from floatframe.files.system_file.signal_section import SignalFunction, function_named
-from floatframe.model.bodies.coordinates import JointCoordinateName
+from floatframe.model.bodies.coordinates import Coordinate, JointCoordinateName
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.functions.registry import TIME_FUNCTIONS
 from floatframe.model.functions.time_functions import TimeFunction
@@ -142,6 +142,8 @@ class DescribedSection(AcceptedTable):
                 if values["body"] is not None:
                     is_body = str in get_args(hint) and all(values[role] is None for role in ("place", "triad"))
                     given[each.name] = values["body"] if is_body else marker_of(**values)
+                elif stray := [keys[role] for role, value in values.items() if value is not None]:
+                    raise ModelError(f"{keys['body']}: missing; expected the name of the body of {stray[0]}")
             elif is_named(hint, self.type):
                 given[each.name] = self.type
             elif each.name in self.model_fields_set:
@@ -360,7 +362,7 @@ def key_of(hint: Any) -> Key | None:
         keys = list(dict.fromkeys(key for each in within if each not in others and (key := key_of(each)) is not None))
         return keys[0] if len(keys) == 1 else either(keys) if keys else None
     if isinstance(hint, type) and is_dataclass(hint):
-        return Key(fields_table_of(hint), f"a table of a {hint.__name__}")
+        return Key(fields_table_of(hint), f"a table of the fields of {hint.__name__}")
     parts: list[Any] = [key_of(each) for each in within if each is not Ellipsis]
     if not isinstance(origin, type) or None in parts or not parts:
         return None
@@ -368,13 +370,8 @@ def key_of(hint: Any) -> Key | None:
     if issubclass(origin, Mapping):
         return Key(GenericAlias(dict, kinds), f"a table, each value of it {meaning}")
     if origin is tuple and Ellipsis not in within:
-        return Key(Annotated[GenericAlias(tuple, kinds), BeforeValidator(items_of)], f"a list of {len(kinds)}")
+        return Key(Annotated[GenericAlias(tuple, kinds), BeforeValidator(tuple_of_list)], f"a list of {len(kinds)}")
     return Key(GenericAlias(list, kinds), f"a list, each of it {meaning}") if issubclass(origin, Sequence) else None
-
-
-def items_of(value: Any) -> Any:
-    """Return a list as a tuple."""
-    return tuple(value) if isinstance(value, list) else value
 
 
 def either(keys: Sequence[Key]) -> Key:
@@ -389,8 +386,8 @@ class Either:
     keys: tuple[Key, ...]
 
     def model_of(self, value: Any) -> Any:
-        """Return the type of a table that the value may be."""
-        for key in self.keys:
+        """Return the type of a table that the value may be; None if it is no table."""
+        for key in self.keys if isinstance(value, Mapping) else ():
             for note in getattr(key.type, "__metadata__", ()):
                 if hasattr(note, "model_of"):
                     return note.model_of(value)
@@ -600,7 +597,7 @@ KEYS: dict[Any, Key] = {
     Path: Key(ExistingFile, "the path of a file"),
     Marker: Key(MarkerSection, 'a marker, {body = "NAME", marker = "INTERFACE" or [x, y, z]}'),
     TimeFunction: Key(MotionSection, "the table of a function"),
-    JointCoordinateName: Key(NamedCoordinate, '"JOINT.COORDINATE" or a table of a coordinate'),
+    **dict.fromkeys(get_args(Coordinate), Key(NamedCoordinate, '"JOINT.COORDINATE" or a table of a coordinate')),
     Address: Key(NodeOrPosition, "a position [x, y, z] in the body, or {node = 12}"),
     np.ndarray: Key(
         Annotated[Any, PlainValidator(numbers_of_any_shape, json_schema_input_type=Numbers)], "a list of numbers"

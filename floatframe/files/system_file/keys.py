@@ -14,6 +14,7 @@ __all__ = [
     "Numbers",
     "Parameters4",
     "Positive",
+    "tuple_of_list",
 ]
 
 Name = Annotated[str, StringConstraints(min_length=1)]
@@ -42,9 +43,9 @@ Parameters4 = Annotated[tuple[float, float, float, float], BeforeValidator(four_
 Number = Annotated[float, Field(allow_inf_nan=False)]
 
 
-def list_of_numbers(value: Any) -> Any:
+def tuple_of_list(value: Any) -> Any:
     """Return a list of the file as a tuple, which is validated afterwards."""
     return tuple(value) if isinstance(value, list) else value
 
 
-Numbers = Annotated[tuple[Number, ...], BeforeValidator(list_of_numbers)]
+Numbers = Annotated[tuple[Number, ...], BeforeValidator(tuple_of_list)]

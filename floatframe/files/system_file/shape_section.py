@@ -8,6 +8,7 @@ from pydantic import BeforeValidator, Field
 
 from fe_models.foundation.toml_file import existing_file
 from floatframe.files.system_file.described import DescribedSection, OneOf, Signals, keys_of_fields, model_of_keys
+from floatframe.files.system_file.keys import Positive
 from floatframe.model.shapes import GEOMETRIES, Shape
 from floatframe.model.shapes.mesh import mesh_file
 
@@ -18,7 +19,7 @@ SurfaceFile = Annotated[Path, BeforeValidator(existing_file("surface such as an 
 #: keys of a mesh, instead of nodes and triangles
 OF_FILE = {
     "file": (SurfaceFile, Field(description="the path of a surface, relative to the system file")),
-    "scale": (float | None, Field(None, description="a factor above 0 on the numbers of the file")),
+    "scale": (Positive | None, Field(None, description="a factor above 0 on the numbers of the file")),
 }
 
 

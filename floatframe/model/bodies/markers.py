@@ -9,7 +9,7 @@ from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.foundation.arrays import GivenArrayOrNone, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import ModelError
-from floatframe.model.checked_values import array_of_shape, rotation_of
+from floatframe.model.checked_values import array_of_shape, number, rotation_of
 
 __all__ = ["Marker", "Named", "Place", "body_name"]
 
@@ -71,6 +71,7 @@ class Marker:
             object.__setattr__(self, "position", array_of_shape(f"{where}: position", self.position, (3,)))
         if self.triad is not None:
             object.__setattr__(self, "triad", rotation_of(f"{where}: triad", self.triad))
+        number(f"{where}: tolerance", self.tolerance, at_least=0.0)
 
     @staticmethod
     def of_name(name: str) -> "Marker":

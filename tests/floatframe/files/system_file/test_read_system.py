@@ -68,6 +68,12 @@ rho_inf = 0.7
 output_every = 5
 """
 
+#: a sensor that may stand before the table [run]
+TIP = """[sensors.tip]
+type = "position"
+body = "bob"
+"""
+
 
 @pytest.fixture
 def write(tmp_path):
@@ -108,6 +114,8 @@ def test_file_becomes_the_system_it_describes(write):
     [
         ('units = "m-kg-s"', 'units = "m-kg-z"', r'units = "m-kg-z": unknown unit system; did you mean .m-kg-s.'),
         ('file = "rod.h5"', 'file = "rad.h5"', r"no such file: .*rad.h5; did you mean 'rod.h5'"),
+        ('file = "rod.h5"', 'file = "rod.h5"\nmodes = ["a"]',
+         r'bodies.rod.modes.0 = "a": expected a list of whole numbers from 0, the modes to keep \(line 8\)'),
         ("mass = 2.0", "mass = -2.0", r"bodies.bob.mass = -2.0: expected a number above 0"),
         ("mass = 2.0", "mas = 2.0", r"bodies.bob.mas: unknown key; did you mean 'mass'"),
         ("inertia = [[0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]]", "", "inertia: missing; a rigid body needs"),
@@ -123,6 +131,9 @@ def test_file_becomes_the_system_it_describes(write):
         ("axis = [0, 1, 0]", "axis = [0, nan, 0]", r"axis = \[0, nan, 0\]: expected finite numbers, .* \(line 22\)"),
         ("stiffness = 10", "stiffness = -1", r"spring.stiffness = -1: expected a number >= 0, got -1 \(line 35\)"),
         ("force = [1, 0, 0]", "stiffness = 3", 'push.stiffness: unknown key of type "point-force"; choices: amplitude'),
+        ("[run]", TIP + "tolerance = -0.1\n[run]", r"marker on 'bob': tolerance: expected a number >= 0, got -0.1"),
+        ("[run]", TIP + "relative_marker = [0, 0, 1]\n[run]",
+         r"sensors.tip: relative_to: missing; expected the name of the body of relative_marker \(line 44\)"),
         ("t_end = 0.05", "", "run.t_end: missing; expected a number above 0, the end time"),
         ("h = 1e-3", "h = 0", "run.h = 0: expected a number above 0"),
         ("rho_inf = 0.7", "rho_inf = 1.7", "run.rho_inf = 1.7"),
@@ -250,6 +261,18 @@ pieces = [
         (tmp_path / "wrong.toml").write_text(path.read_text().replace(old, new))
         with pytest.raises(SystemFileError, match=words):
             read_system(tmp_path / "wrong.toml")
+
+
+def test_a_number_fixes_a_coordinate(tmp_path):
+    """In a file as in Python, where the motions are {"angle": 0.5}."""
+    path = tmp_path / "screw.toml"
+    begin, end = DRIVEN.index("[joints.thread.motions.angle]"), DRIVEN.index("[joints.rod]")
+    path.write_text(DRIVEN[:begin] + "[joints.thread.motions]\nangle = 0.5\n\n" + DRIVEN[end:])
+    motion = read_system(path)[0].joints[0].motions["angle"]
+    assert [motion(0.0), motion(3.0)] == [0.5, 0.5]
+    path.write_text(path.read_text().replace("angle = 0.5", 'angle = "0.5"'))
+    with pytest.raises(SystemFileError, match=r'motions.angle = "0.5": expected .* a number .*\(line'):
+        read_system(path)
 
 
 @pytest.mark.parametrize(

@@ -78,6 +78,7 @@ def test_tables_become_shapes(tmp_path):
         (('color = "red"', 'color = "rde"'), "#rrggbb"),
         (('color = "red"', 'interface = "rim"'), "there is no interface 'rim'; it has none"),
         (("part.stl", "none.stl"), "no such file"),
+        (("scale = 0.001", "scale = -0.001"), r"shapes.1.scale = -0.001: expected a factor above 0 .* \(line 19\)"),
         (("part.stl", "system.toml"), "cannot be read as a surface"),
         (("cant = [0.0, 0.1]", "cant = [0.0, 0.1, 0.1]"), r"expected shape \(2,\)"),
     ],
