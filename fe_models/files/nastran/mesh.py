@@ -90,7 +90,6 @@ def read_nastran(path: Path, data: bytes) -> RawMesh:
     points = read_grid_points(placing, only_positions=True).positions
     if not points:
         raise MeshError(f"{where}: expected grid points (GRID), got none; is this a Nastran bulk data file?")
-    points = {number: points[number] for number in dict.fromkeys(c.integer(1) for c in placing if c.name == "GRID")}
     notes = [f"{times} {name} cards were left out" for name, times in noted.items()]
     if BEGIN.search(text) and not END.search(text):
         notes.append("BEGIN BULK without ENDDATA at the end: is the file complete?")
@@ -121,7 +120,10 @@ def element_of(card: Card, group: str, ends: Mapping[int, str] = MappingProxyTyp
     MeshError
         If some of its middle nodes are left out.
     """
-    given = [ends.get(k, card.text(3 + k)) for k in range(max(ELEMENT_TYPES[card.name]))]
+    widest = max(ELEMENT_TYPES[card.name])
+    given = [*card.fields[2 : 2 + widest], *[""] * (2 + widest - len(card.fields))]
+    for k, node in ends.items():
+        given[k] = node
     return Element(card.name, card.integer(1), group, nodes_of(card.where, card.name, given))
 
 
