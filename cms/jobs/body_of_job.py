@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cms.errors import JobError
@@ -84,7 +83,7 @@ def matrices_of_job(job: Job, stages: Stages) -> "GivenMatrices | GivenArrays":
 
     body = job.body
     if body.brings_interfaces:
-        return GivenArrays(Path(str(body.matrices)), held=bool(body.held), repair_mass=bool(body.repair_mass))
+        return GivenArrays(str(body.matrices), held=bool(body.held), repair_mass=bool(body.repair_mass))
     with stages("read matrices"):
         read = read_matrices(body.matrices or (), names=body.names)
     with stages("read geometry"):

@@ -159,7 +159,9 @@ def _require_one_kind(model: FEModel) -> None:
     if model.plane is not None:
         raise BodyError(f"{where}: plane: belongs to a RawMesh; remove it, and call fe_models.planar(couple(body))")
     if model.mass not in (None, "consistent") and kind is not Mesh:
-        raise BodyError(f"{where}: mass: a {name} has consistent mass, got {model.mass!r}; give a RawMesh")
+        advice = "remove it" if kind is GivenElements else "give a RawMesh"
+        given = "its own" if kind is GivenElements else "consistent"
+        raise BodyError(f"{where}: mass: a {name} has {given} mass, got {model.mass!r}; {advice}")
 
 
 def _joined_body(model: FEModel, stages: Stages, on_report: OnReport) -> FEBody:

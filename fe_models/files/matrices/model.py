@@ -71,7 +71,7 @@ class GivenArrays:
         As for `body_from_npz`.
     """
 
-    path: Path
+    path: str | Path
     held: bool = False
     repair_mass: bool = False
 

@@ -103,8 +103,14 @@ def test_tables_of_elements_beside_matrices_are_refused(read):
         fm.assemble(model)
 
 
+def test_a_kind_of_mass_beside_matrices_is_refused(read):
+    model = FEModel.of("bar", fm.files.GivenMatrices(read), units="m-kg-s", mass="lumped")
+    with pytest.raises(BodyError, match="mass: a GivenMatrices has its own mass, got 'lumped'; remove it"):
+        fm.assemble(model)
+
+
 def test_interfaces_beside_an_archive_that_brings_them_are_refused(tmp_path):
-    arrays = fm.files.GivenArrays(tmp_path / "bar.npz")
+    arrays = fm.files.GivenArrays(str(tmp_path / "bar.npz"))
     model = FEModel.of("bar", arrays, units="m-kg-s", interfaces={"a": {"nodes": [1], "kind": "rigid"}})
     with pytest.raises(BodyError, match=r"interfaces: .*bar.npz brings its own"):
         fm.assemble(model)
