@@ -32,7 +32,8 @@ BEYOND_MASS = "inertia beyond the mass matrix, geometric stiffness, stress"
 OVER_INTERFACES = frozenset({"damping", "rotation", "load cases", "axes in B"})
 SID_FEM = frozenset({"gyroscopic", "geometric", "damping", "rotation", "axes in the mesh"})
 REDUCED = "reduced body"
-FORMATS = (
+#: writer of each format by its key
+WRITERS = {writer.key: writer for writer in (
     Writer(
         "ExternalFlexibleFfrBody, HDF5", "MBSim", REDUCED, (".h5",), key="mbsim",
         tried="h5py; names and orders of its source",
@@ -107,8 +108,7 @@ FORMATS = (
         lost="all but shapes and stress", make=make_vtk,
         content=frozenset({"surface", "stress", "axes in the mesh"}), takes_held=True, needs=("modes", "nodes"),
     ),
-)  # fmt: skip
-WRITERS = {writer.key: writer for writer in FORMATS}  #: writer of each format by its key
+)}  # fmt: skip
 
 NEEDS = {
     "modes": (
