@@ -357,7 +357,11 @@ def test_groups_of_one_name_and_two_dimensions_and_cells_without_a_group(tmp_pat
         ("1 4 2 1 1 1 2 3 4", "1 44 2 1 1 1 2 3 4", "Gmsh type 44"),
         ("$Elements\n1\n", "$Elements\n7\n", "7 cells announced, 1 lines found"),
         ("3 0 1 0", "3 0 one 0", "expected numbers only"),
-        ("$Nodes\n4", "$Nodes\nfour", "could not be read as MSH 2.2, 4.1 (Gmsh): it is damaged or of another kind"),
+        (
+            "$Nodes\n4",
+            "$Nodes\nfour",
+            "could not be read as MSH 2.2, 4.1 (Gmsh): it is damaged or of another kind (ValueError",
+        ),
         ("$Elements\n1\n1 4 2 1 1 1 2 3 4\n$EndElements\n", "", "expected a section $Elements"),
         ("$EndNodes", "$EndNodes\n$Nodes\n0\n$EndNodes", "section $Nodes is there twice"),
     ],
