@@ -21,7 +21,7 @@ def included_text(where: str, path: Path, files: tuple[Path, ...], included: dic
     path
         The included file.
     files
-        Files around it, from the deck on.
+        Files that include it, from the deck on.
     included
         Dictionary that receives the sha256 of each included file, by path.
 

@@ -62,18 +62,18 @@ def bytes_of(
 def reading(
     where: str, path: Path, known: object, error: type[Exception], own: type[Exception] | tuple[type[Exception], ...]
 ) -> Iterator[None]:
-    """Turn every fault of a reader into one message, whatever a damaged file does to it.
+    """Turn every error of a reader, such as those caused by a damaged file, into one message.
 
     Parameters
     ----------
     where, path
         Name of the file for messages, and its path.
     known
-        The format as which the file is read.
+        Format of the file, for messages.
     error
         Class of the message.
     own
-        Roots of the errors that already are messages; they pass.
+        Errors that already have a message for the user; they are raised unchanged.
     """
     try:
         yield

@@ -35,7 +35,7 @@ NUMBERS = {
     "/surface/instance": "element_instance",
 }  #: field of `Numbering` for each dataset
 INVARIANTS = ("J0", "C1", "C2", "C3", "C4", "C5")
-#: field, or property that follows from fields, of each dataset in a group of `GROUPS`, by its name in the file
+#: for each group of `GROUPS`: field or derived property of its class, by the name of the dataset in the file
 FIELDS = {
     group: {
         name: own
@@ -70,7 +70,7 @@ def content_of(body: ReducedBody, version: int) -> Content:
         values["/instances/names"] = numbering.instances
     if body.stress is not None:
         values["/stress/nodal"] = body.stress
-    if (geometric := body.geometric) is not None:  # that of interfaces is stored with the interfaces
+    if (geometric := body.geometric) is not None:  # loads at interfaces are stored with the interfaces
         attributes["/geometric"] = {}
         values |= {f"/geometric/{name}": getattr(geometric, name) for name in OF_FRAME}
         of_interfaces = {"K_geometric": geometric.interfaces}
@@ -102,7 +102,7 @@ def content_of(body: ReducedBody, version: int) -> Content:
 
 
 def items_of(body: ReducedBody) -> dict[str, tuple[Any, ...]]:
-    """Return the objects in each group of `GROUPS`; groups that a body need not have are left out if it has none."""
+    """Return the objects in each group of `GROUPS`, without the optional groups that the body does not have."""
     always = {
         "/units": (body.units,), "/frame": (body.frame,), "/modes": (body,), "/nodes": (body,), "/surface": (body,),
         "/interfaces/<i>": body.interfaces, "/load_cases/<i>": body.load_cases,
@@ -165,7 +165,8 @@ def body_of(content: Content) -> ReducedBody:
 def without_version_1(content: Content) -> Content:
     """Return the content of a file of version 1 as later versions store it.
 
-    It has neither dofs of a nodal frame, nor whether an interface of nodes has a rotation: then a zero is none.
+    Version 1 stores neither the dofs of a nodal frame, nor whether an interface of kind "nodes" has a rotation; the
+    interface has one unless its stored rotation is zero.
     """
     if content.version >= 2:
         return content
@@ -256,7 +257,7 @@ def moments_of(contents: Contents) -> Moments:
 
 
 def geometric_of(contents: Contents) -> GeometricStiffness:
-    """Return the geometric stiffness; that of loaded interfaces is stored with the interfaces."""
+    """Return the geometric stiffness; the groups of the interfaces contain the matrices of loads at interfaces."""
     value, paths = contents.value, contents.numbered("/interfaces")
     is_loaded = [f"{path}/K_geometric" in contents.content.datasets for path in paths]
     if contents.content.version < 6:

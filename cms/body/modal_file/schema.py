@@ -323,7 +323,7 @@ class Group:
     holds: type
     attributes: Mapping[str, type] = field(default_factory=dict)  #: type of each attribute; bool is stored as 0 or 1
     names: Mapping[str, str] = field(default_factory=dict)  #: field of each dataset that has another name
-    follows: tuple[str, ...] = ()  #: datasets that follow from the others, for other readers
+    follows: tuple[str, ...] = ()  #: derived datasets, for other readers
     if_any: tuple[str, ...] = ()  #: lists of texts that are left out if they are empty
 
 

@@ -113,7 +113,7 @@ def element_of(card: Card, group: str, ends: Mapping[int, str] = MappingProxyTyp
     Parameters
     ----------
     ends
-        Grid point that replaces the one at place k of the card, by k.
+        Grid points that replace those of the card, by their place in it, from 0.
 
     Raises
     ------
