@@ -219,12 +219,13 @@ def _read(path: str | Path, convert: Callable[[RawMesh, Path, str], M]) -> M:
     path = Path(path)
     where = f"mesh {path}"
     suffix = path.suffix.lower()
-    if suffix in CAD_FORMATS:
+    is_there = path.exists() and not path.is_dir()  # otherwise `bytes_of` names the fault
+    if is_there and suffix in CAD_FORMATS:
         raise MeshError(
             f"{where}: this is a CAD geometry, which must be meshed: a table [mesh_size] in a job, or "
             f"fe_models.files.mesh_cad(path, fe_models.files.MeshSize(size), units=...)"
         )
-    if suffix not in MESH_FORMATS and path.exists() and not path.is_dir():
+    if is_there and suffix not in MESH_FORMATS:
         raise MeshError(f"{where}: unknown suffix {quoted(suffix)}{nearest(suffix, MESH_FORMATS)}")
     data = bytes_of(where, path, MeshError, hint=_neighbours)
     known = MESH_FORMATS[suffix]

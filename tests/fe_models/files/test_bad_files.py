@@ -94,6 +94,12 @@ def good_files(tmp_path):
 # --- files as such -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("name", ["rod.msh", "rod.step", "rod.odb"])
+def test_a_missing_file_is_called_missing_whatever_its_suffix(tmp_path, name):
+    with pytest.raises(MeshError, match="there is no such file"):
+        read_mesh(tmp_path / name)
+
+
 def test_missing_file_names_its_neighbours(tmp_path):
     (tmp_path / "rod.msh").write_text("")
     with pytest.raises(MeshError, match=r"there is no such file; did you mean 'rod.msh'\?"):
