@@ -77,11 +77,12 @@ def judged(n: int) -> tuple[int, dict[str, np.ndarray]]:
                 if (modes := set_of(name, families, rng)) is None:
                     continue
                 try:
-                    errors = error_estimates(families, modes, free_basis(body, modes, families))
+                    basis = free_basis(body, modes, families)
+                    errors = error_estimates(families, modes, basis).frequency
                 except CmsError:
                     continue
-                k = min(len(errors.frequencies), len(exact))
-                found[name] += zip(errors.frequencies[:k] / exact[:k] - 1, errors.frequency[:k], strict=True)
+                k = min(len(errors), len(exact))
+                found[name] += zip(basis.frequencies()[:k] / exact[:k] - 1, errors[:k], strict=True)
     return n_bodies, {name: np.array(pairs).reshape(-1, 2) for name, pairs in found.items()}
 
 
@@ -113,7 +114,7 @@ def print_cost(n: int, n_modes: int) -> None:
         began = time.perf_counter(), time.process_time()
         errors = error_estimates(families, modes, basis)
         seconds["estimates"] = time.perf_counter() - began[0], time.process_time() - began[1]
-    print(f"{body.n_dof} dofs, {reduced.n_q} modes, {len(errors.frequencies)} of them judged")
+    print(f"{body.n_dof} dofs, {reduced.n_q} modes, {len(errors.frequency)} of them judged")
     for name, (clock, processor) in seconds.items():
         print(f"{name:20s}{clock:8.1f} s by the clock, {processor:8.1f} s of the processors")
 

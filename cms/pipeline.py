@@ -230,12 +230,15 @@ class Plan:
         ------
         BodyError
             If the geometric stiffness is requested, but the elements do not know it, an interface is unknown, or the
-            memory of this machine does not suffice.
+            memory of this machine does not suffice; or if error estimates are requested of a distributed body.
         """
         from cms.modes.families.cost import require_room_for_stiffness, stiffness_words
+        from cms.reduction.error_estimates import require_one_process
         from cms.reduction.geometric_stiffness.unit_states import require_geometric_stiffness
 
         estimates = job.reduction.error_estimates if budget is None else False
+        if estimates:
+            require_one_process(body)
         plan = replace(cls.of_stiffness(job, body), solver=solver, estimates=estimates)
         n_columns = min(expected_columns(job, body), body.n_dof)  # the mode set refuses a job with more modes
         words = plan.left_out(n_columns)

@@ -16,16 +16,13 @@ __all__ = ["ErrorEstimates"]
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class ErrorEstimates:
-    """Errors of a reduced body relative to its finite element model (docs/theory.md, "Error estimates").
+    """Errors of a reduced body relative to its finite element model, with four digits (docs/theory.md §8).
 
     Parameters
     ----------
-    frequencies
-        Free frequencies of the reduced body that were judged, the lowest ones, ascending, (n_judged,), in cycles per
-        time unit of the body.
     frequency
-        Estimate of f_reduced / f - 1, (n_judged,), where f is the exact frequency of the same number. The exact error
-        is not smaller.
+        Estimate of f_reduced / f - 1 for each of the lowest free frequencies, (n_judged,), where f is the exact
+        frequency of the same number. The exact error is not smaller.
     bound
         Rigorous bound b, (n_judged,): some exact frequency f satisfies |(f_reduced / f)² - 1| <= b.
     shape
@@ -44,7 +41,6 @@ class ErrorEstimates:
         Day on which they were made, such as "2027-01-31".
     """
 
-    frequencies: Annotated[Array, ArrayShape(("n_judged",))]
     frequency: Annotated[Array, ArrayShape(("n_judged",))]
     bound: Annotated[Array, ArrayShape(("n_judged",))]
     shape: Annotated[Array, ArrayShape(("n_judged",))]

@@ -214,6 +214,10 @@ class ReducedBody(Tabular):
             widths["nodal sums"] = (np.asarray(self.nodal_sums.U1).shape[1],)
         if self.point_stress is not None:
             widths["stress points"] = (np.asarray(self.point_stress.modes).shape[2],)
+        if self.errors is not None and len(self.errors.frequency) > len(self.free_frequencies):
+            raise BodyError(
+                f"{where}: {len(self.free_frequencies)} free frequencies, but errors of {len(self.errors.frequency)}"
+            )
         if self.geometric is not None:
             widths["geometric stiffness"] = (self.geometric.n_q,)
             if len(self.geometric.is_loaded) != len(self.interfaces):

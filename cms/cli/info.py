@@ -133,7 +133,7 @@ def print_free_frequencies(record: Any) -> None:
     if errors is None:
         say(f"{title} [Hz]: {', '.join(frequencies) or 'none'}\n")
         return
-    n = len(errors["frequencies_hz"])
+    n = len(errors["frequency"])
     print_table(
         f"{title}, and their estimated errors by the reduction",
         ("mode>", "Hz>", "error>", "at most>", "shape>"),

@@ -11,8 +11,9 @@ is K-orthogonal to V, because phi is a Galerkin solution.
     sum lambda_j c_j² = theta, so that min_j |lambda_j - theta| / lambda_j <= |e|_K / sqrt(theta) = b. Some exact
     frequency lies within this distance [1]_.
 (2) Estimate. The Rayleigh-Ritz method in span(V, e_1, ..., e_n) gives Ritz values lambda' between the exact ones and
-    theta, so theta / lambda' - 1 never exceeds theta / lambda - 1. A mode j that V lacks contributes with a factor
-    theta / lambda_j, so that little of the error is missed below the cutoff.
+    theta, so theta / lambda' - 1 never exceeds theta / lambda - 1. Of a mode j that V lacks, e has its part of phi
+    times theta / lambda_j - 1, so that little of the error is missed below the cutoff.
+    The error of a shape is its distance from the span of the new shapes whose frequencies are within 0.1 % of lambda'.
 (3) A mode that every phi lacks leaves no trace in e. A few random columns, M-orthogonal to V and smoothed by two steps
     of inverse iteration, are added to the span, so that such a mode appears among the lambda'.
 
@@ -29,6 +30,7 @@ import numpy as np
 import scipy.linalg as la
 
 from cms.body.error_estimates import ErrorEstimates
+from cms.errors import BodyError
 from cms.linear_algebra.independent import Products
 from cms.modes.families.families import Families
 from cms.modes.mode_set import ModeSet
@@ -37,20 +39,21 @@ from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.tall.columns import combine, dots, gram, inner, subtract
 
-__all__ = ["FrequencyErrors", "energy_error", "error_estimates", "frequency_errors"]
+__all__ = ["FrequencyErrors", "energy_error", "error_estimates", "frequency_errors", "require_one_process"]
 
 JUDGED = 30  #: number of judged modes of a set without vibration modes, which has no cutoff
 RANDOM, STEPS, SEED = 6, 2, 20  #: number of random columns of (3), their steps of inverse iteration, and their seed
-NO_ERROR = 1e-10  #: estimated error of a frequency, below which it is rounding
+FREQUENCY_ROUNDING = 1e-10  #: estimated error of a frequency, below which it is rounding
 EXACT = 1e-7  #: bound b, below which a mode is exact within rounding
 INDEPENDENT = 1e-10  #: smallest eigenvalue of the scaled Gram matrix of independent corrections
-CLUSTER = 1e-3  #: relative gap of frequencies, below which shapes are judged as a common subspace
+CLUSTER = 1e-3  #: relative gap of frequencies, below which shapes are judged by their common subspace
+CLUSTERED = 8  #: number of shapes beyond the judged ones that may belong to the subspace of the last of them
 NO_ENERGY = 1e-24  #: strain energy of a response relative to the largest of its kind, below which it is zero
 STATIC_ROUNDING = 1e-5  #: error of a static response, below which it is rounding
 MOST_LOADS, SUMS = 120, 12  #: largest number of unit loads that are judged one by one, else number of sums
 METHOD = (
     "frequency, shape: lower estimates, Rayleigh-Ritz with one step of inverse iteration; bound: rigorous, from the "
-    "residual; static responses: exact"
+    "residual; static responses: computed, not estimated"
 )
 
 
@@ -61,6 +64,15 @@ class FrequencyErrors:
     frequency: Array  #: estimate of f_reduced / f - 1, (n,)
     bound: Array  #: rigorous bound b, (n,)
     shape: Array  #: estimate of the error of the shape in the norm of strain energy, (n,)
+
+
+def require_one_process(body: FEBody) -> None:
+    """Raise `BodyError` if the body is distributed over ranks, where errors are not estimated."""
+    if body.layout is not None:
+        raise BodyError(
+            f"body {body.name!r}: it is distributed over ranks, and errors are estimated in one process only; leave "
+            "the estimates out, or take another solver"
+        )
 
 
 def error_estimates(families: Families, modes: ModeSet, basis: FreeBasis) -> ErrorEstimates:
@@ -82,13 +94,12 @@ def error_estimates(families: Families, modes: ModeSet, basis: FreeBasis) -> Err
     errors = frequency_errors(families, basis, n)
     loads, interface = interface_errors(families, basis)
     return ErrorEstimates(
-        frequencies[:n],
-        four_digits(np.where(errors.frequency < NO_ERROR, 0.0, errors.frequency)),
+        four_digits(errors.frequency, FREQUENCY_ROUNDING),
         four_digits(errors.bound),
         four_digits(errors.shape),
         loads,
-        four_digits(without_rounding(interface)),
-        four_digits(without_rounding(energy_error(families.body, basis, families.Psi_H))),
+        four_digits(interface, STATIC_ROUNDING),
+        four_digits(energy_error(families.body, basis, families.Psi_H), STATIC_ROUNDING),
         METHOD,
         datetime.now(UTC).date().isoformat(),
     )
@@ -97,19 +108,47 @@ def error_estimates(families: Families, modes: ModeSet, basis: FreeBasis) -> Err
 def frequency_errors(families: Families, basis: FreeBasis, n: int) -> FrequencyErrors:
     """Estimate the errors of the lowest n free frequencies and shapes: n + 12 solutions with the factorisation."""
     products, V, omega2 = Products.of_body(families.body), basis.Phi, basis.omega2
-    theta, n_V = omega2[:n], len(omega2)
+    theta = omega2[:n]
     E = theta * families.flexibility(products.M @ V[:, :n]) - V[:, :n]
     K_E = products.K @ E
     bound = np.sqrt(np.maximum(dots(E, K_E), 0.0) / theta)  # (1)
     subtract(E, V, inner(V, K_E) / omega2[:, None])  # rounding
-    corrections = [E[:, bound > EXACT]]
-    for X in smoothed_columns(families, basis, products):  # (3)
+    X = np.hstack([E[:, bound > EXACT], *random_columns(families, basis, products)])
+    mu, Y = enlarged_shapes(basis, X, products, n + CLUSTERED)  # (2)
+    frequency = np.sqrt(np.maximum(theta * mu[:n], 1.0)) - 1
+    own = np.sqrt(mu[:n, None])
+    inside = np.where(np.abs(np.sqrt(mu) - own) < CLUSTER * own, Y[:n] ** 2, 0.0).sum(axis=1)
+    return FrequencyErrors(frequency, bound, np.sqrt(np.maximum(1 - inside, 0.0)))
+
+
+def random_columns(families: Families, basis: FreeBasis, products: Products) -> Iterator[Array]:
+    """Yield the columns of (3) after each step of inverse iteration, K-orthogonal to the span of the set.
+
+    Each step begins M-orthogonal to the span. Columns that lie in the span are left out.
+    """
+    V, massive = basis.Phi, basis.vibrating
+    F = products.M @ np.random.default_rng(SEED).standard_normal((families.body.n_dof, RANDOM))
+    for _ in range(STEPS):
+        X = families.flexibility(F)
+        F = products.M @ (X - combine(massive, inner(massive, products.M @ X)))
         before = dots(X, products.K @ X)
         for _ in range(2):
             K_X = products.K @ X
-            subtract(X, V, inner(V, K_X) / omega2[:, None])
-        corrections.append(X[:, dots(X, K_X) > EXACT**2 * before])
-    X = np.hstack(corrections)
+            subtract(X, V, inner(V, K_X) / basis.omega2[:, None])
+        yield X[:, dots(X, K_X) > EXACT**2 * before]
+
+
+def enlarged_shapes(basis: FreeBasis, X: Array, products: Products, n: int) -> tuple[Array, Array]:
+    """Return 1 / omega² of the lowest n shapes in the span of V and X, where VᵀKX = 0, by the Rayleigh-Ritz method.
+
+    Returns
+    -------
+    mu
+        1 / omega², descending, (n,); fewer if the span is smaller.
+    Y
+        Part of each shape of V, scaled to unit strain energy, in each of these shapes, (n_V, n).
+    """
+    omega2 = basis.omega2
     K_X = products.K @ X
     size = 1 / np.sqrt(np.maximum(dots(X, K_X), np.finfo(float).tiny))
     energies, T = la.eigh(gram(X, K_X) * np.outer(size, size))
@@ -117,37 +156,18 @@ def frequency_errors(families: Families, basis: FreeBasis, n: int) -> FrequencyE
     T = size[:, None] * T[:, is_independent] / np.sqrt(energies[is_independent])
     M_X = products.M @ X
     inverse = np.where(basis.is_massive, 1 / omega2, 0.0)
-    beside = (inner(V, M_X) / np.sqrt(omega2)[:, None]) @ T
+    beside = (inner(basis.Phi, M_X) / np.sqrt(omega2)[:, None]) @ T
     mass = np.block([[np.diag(inverse), beside], [beside.T, T.T @ gram(X, M_X) @ T]])
-    mu, Y = la.eigh(mass, subset_by_index=[len(mass) - n, len(mass) - 1])  # (2)
-    mu, Y = mu[::-1], Y[:n_V, ::-1]
-    frequency = np.sqrt(np.maximum(theta * mu, 1.0)) - 1
-    is_near = basis.is_massive & (np.abs(np.sqrt(theta[:, None] / omega2) - 1) < CLUSTER)
-    inside = np.einsum("kj,jk->k", is_near, Y**2)
-    return FrequencyErrors(frequency, bound, np.sqrt(np.maximum(1 - inside, 0.0)))
+    mu, Y = la.eigh(mass, subset_by_index=[max(0, len(mass) - n), len(mass) - 1])
+    return np.maximum(mu[::-1], 0.0), Y[: len(omega2), ::-1]
 
 
-def smoothed_columns(families: Families, basis: FreeBasis, products: Products) -> Iterator[Array]:
-    """Yield random columns after each step of inverse iteration, which is made M-orthogonal to the span of the set."""
-    massive = basis.vibrating
-    F = products.M @ np.random.default_rng(SEED).standard_normal((families.body.n_dof, RANDOM))
-    for _ in range(STEPS):
-        X = families.flexibility(F)
-        F = products.M @ (X - combine(massive, inner(massive, products.M @ X)))
-        yield X
-
-
-def four_digits(errors: Array) -> Array:
-    """Return errors with four digits, which do not depend on the number of threads; further ones mean nothing."""
-    return np.array([float(f"{error:.4g}") for error in errors])
+def four_digits(errors: Array, rounding: float = 0.0) -> Array:
+    """Return errors with four digits, zero below `rounding`; further digits depend on the number of threads."""
+    return np.array([0.0 if error < rounding else float(f"{error:.4g}") for error in errors])
 
 
 # static responses, which are known exactly ----------------------------------------------------------------------------
-
-
-def without_rounding(errors: Array) -> Array:
-    """Return zero in place of errors that are rounding."""
-    return np.where(errors < STATIC_ROUNDING, 0.0, errors)
 
 
 def interface_errors(families: Families, basis: FreeBasis) -> tuple[tuple[str, ...], Array]:

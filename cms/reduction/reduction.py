@@ -35,7 +35,7 @@ from cms.reduction.basis.node_results import (
     weighted_rigid_modes,
 )
 from cms.reduction.basis.strain_damping import StrainDamping
-from cms.reduction.error_estimates import error_estimates
+from cms.reduction.error_estimates import error_estimates, require_one_process
 from cms.reduction.geometric_stiffness.geometric_reduction import stiffness_of_states
 from cms.reduction.geometric_stiffness.quadratic_modes import quadratic_modes
 from cms.reduction.geometric_stiffness.unit_states import (
@@ -123,8 +123,9 @@ def reduce(
     ModeSetError
         If the set does not belong to the body, or no elastic shape is left.
     BodyError
-        If the body is a mechanism or the frame cannot be attached; or if the geometric stiffness is requested of a body
-        without an element model, or does not fit into the memory of this machine.
+        If the body is a mechanism or the frame cannot be attached; if the geometric stiffness is requested of a body
+        without an element model, or does not fit into the memory of this machine; or if errors are requested of a body
+        that is distributed over ranks.
     RecoveryError
         If the body does not know a requested recovery row.
     """
@@ -143,6 +144,8 @@ def reduce(
             f"reduce: mode set {modes.name!r} has columns of {modes.columns.shape[0]} dofs, body "
             f"{body.name!r} has {body.n_dof}; make the set from this body"
         )
+    if errors:
+        require_one_process(body)
     if left_out:
         log.warning("body %r: %s", body.name, left_out)
         geometric = False
@@ -172,7 +175,7 @@ def reduce(
         errors = isinstance(source, Families) and source.has_factor
     return replace(
         reduced,
-        errors=errors_of(source, modes, finished, reduced.free_frequencies) if errors else None,
+        errors=errors_of(source, modes, finished) if errors else None,
         provenance={**reduced.provenance, **{key: words for key, words in told.items() if words}},
         recovery=recovery_of_model(source, in_memory(finished.Phi), condition, reduced, recovery) if recovery else {},
         stress=nodal_stress_modes(body, finished.Phi, kept, condition.frame.axes) if stress else None,
@@ -184,12 +187,10 @@ def reduce(
     )
 
 
-def errors_of(source: FEBody | Families, modes: ModeSet, finished: FinishedBasis, frequencies: Array) -> ErrorEstimates:
-    """Return the estimated errors of the free frequencies, from a factorisation of its own if the source has none."""
+def errors_of(source: FEBody | Families, modes: ModeSet, finished: FinishedBasis) -> ErrorEstimates:
+    """Return the estimated errors, from a factorisation of its own if the source has none."""
     with families_of(source) as families, one_blas_thread():
-        made = error_estimates(families, modes, basis_of_finished(families, finished))
-    stored = frequencies[: len(made.frequencies)]
-    return replace(made, frequencies=stored) if len(stored) == len(made.frequencies) else made
+        return error_estimates(families, modes, basis_of_finished(families, finished))
 
 
 def assembled(

@@ -47,6 +47,15 @@ def test_the_check_of_a_reduction_is_that_of_one_process():
     assert [(r.name, r.verdict) for r in records[1]] == [(r.name, r.verdict) for r in records[0]]
 
 
+def test_errors_are_left_out_on_ranks_and_refused_if_they_are_requested():
+    _, spread = pair(2)
+    with Families(spread) as families:
+        modes = craig_bampton(families, n_modes=4)
+        assert reduce(families, modes, geometric=False).errors is None
+        with pytest.raises(BodyError, match="distributed over ranks, and errors are estimated in one process only"):
+            reduce(families, modes, geometric=False, errors=True)
+
+
 @pytest.mark.parametrize("size", [2, 3])
 @pytest.mark.parametrize("kind", ["rigid", "distributing", "nodes"])
 @pytest.mark.parametrize("frame", [cms.NodalFrame("left"), cms.TisserandFrame(), cms.reduction.BuckensFrame()])

@@ -3,15 +3,14 @@
 import inspect
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Any, Protocol
 
 import numpy as np
 
 from cms.assessment.compare.coordinates import ReferenceBasis
-from cms.assessment.compare.estimated_selection import select_by_estimate
 from cms.assessment.compare.free_shapes import judged_subset
-from cms.assessment.compare.selection import FEWEST, MOST, Selection, Trial
 from cms.assessment.compare.subsets import SUBSETS
 from cms.assessment.quality.of_reduction.frf import DAMPING, LOWEST, compare_responses, frequency_grid
 from cms.assessment.quality.reference.full_reference import FullReference
@@ -20,15 +19,46 @@ from cms.errors import ModeSetError
 from cms.modes.families.families import Families, families_of
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets import MODE_SETS
-from cms.reduction.basis.free_basis import FreeBasis
+from cms.reduction.basis.free_basis import FreeBasis, free_basis
+from cms.reduction.error_estimates import frequency_errors
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.presentation import presented
 from fe_models.foundation.tall.columns import in_memory
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["MEASURES", "Selection", "Trial", "check_request", "select_modes"]
+__all__ = ["ESTIMATE", "MEASURES", "Selection", "Trial", "select_modes"]
 
+FEWEST = 8  #: number of modes of the first set that is computed
+MOST = 300  #: default number of modes above which the search fails
 ESTIMATE = "estimate"  #: the measure that needs no solution of the full model
+SAFETY = 2.0  #: allowed ratio of a true error to its estimate, which is at most the true error
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Result of a set with one number of modes."""
+
+    n_modes: int
+    n_columns: int  #: number of columns of the mode set, including static columns
+    error: float  #: error in the chosen measure; inf if a mode of the band is missing, or the set could not be computed
+    where: str  #: place of the largest error, for messages
+
+
+@presented
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """Chosen mode set and the reason for the choice."""
+
+    modes: ModeSet
+    n_modes: int
+    error: float  #: error with the chosen number of modes
+    history: tuple[Trial, ...]  #: results for all numbers of modes that were tried, ascending
+    sentence: str  #: the choice and its reason in words
+    options: Mapping[str, str] = field(default_factory=dict)  #: options that the caller gave
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "options", MappingProxyType(dict(self.options)))
 
 
 def select_modes(
@@ -48,6 +78,9 @@ def select_modes(
     (2) if smaller sets are columns of larger ones: compute the set once with many modes, and assess its subspaces with
         0, 1, 2, … modes in small coordinates until one meets the error; if none does, repeat with twice as many modes
     (3) for other sets: try 0, 1, 2, 4, … modes until one meets the error, then find the fewest by bisection
+    (4) with the measure "estimate", in place of all this: count the exact modes of the band by the inertia of
+        K - sigma M; try 8, 16, 32, … modes until as many frequencies have small estimated errors and lie in the band,
+        so that the set lacks none; then find the fewest by bisection
 
     Parameters
     ----------
@@ -78,34 +111,32 @@ def select_modes(
         If numbers or names are wrong, the band holds no mode, or no number of modes meets the error. In the last case
         the message contains the best result.
     """
-    check_request(set, error, band)
+    _check(set, error, band)
     if measure not in (*MEASURES, ESTIMATE):
         raise ModeSetError(f"select_modes: unknown measure {quoted(measure)}{nearest(measure, [*MEASURES, ESTIMATE])}")
     options = dict(options or {})
     with ExitStack() as stack:
         families = stack.enter_context(families_of(body))
-        if measure == ESTIMATE:
-            return select_by_estimate(
-                families, set=set, error=error, band=band, options=options, added=added, most=most
-            )  # fmt: skip
-        reference = stack.enter_context(FullReference(families, band=band[1]))
-        judge = MEASURES[measure](reference, band)
         make = _Maker(set, families, options, added, most)
-        search = _by_subspaces if set in SUBSETS and added is None else _by_bisection
-        tried: dict[int, Trial] = {}
-        for trial in search(make, judge, reference, error):
-            tried[trial.n_modes] = trial
+        if measure == ESTIMATE:
+            words, trials = "an estimated error of the free frequencies", _by_estimate(make, band, error)
+        else:
+            reference = stack.enter_context(FullReference(families, band=band[1]))
+            judge = MEASURES[measure](reference, band)
+            search = _by_subspaces if set in SUBSETS and added is None else _by_recomputation
+            words, trials = judge.words, search(make, judge, reference, error)
+        tried = {trial.n_modes: trial for trial in trials}
         history = tuple(tried[n] for n in sorted(tried))
         met = [trial for trial in history if trial.error <= error]
         if not met:
             best = min(history, key=lambda trial: trial.error)
             raise ModeSetError(
-                f"select_modes: mode set {set!r} does not meet {judge.words} of {error:g} from {band[0]:g} to "
+                f"select_modes: mode set {set!r} does not meet {words} of {error:g} from {band[0]:g} to "
                 f"{band[1]:g} Hz with up to {history[-1].n_modes} modes; the best was {best.error:.3g} with "
                 f"{best.n_modes}, {best.where}; accept a larger error, or take another set or a lower band"
             )
         chosen = met[0]
-        sentence = _sentence(set, chosen, tried.get(chosen.n_modes - 1), judge.words, error, band)
+        sentence = _sentence(set, chosen, tried.get(chosen.n_modes - 1), words, error, band)
         asked = {"selected": sentence, "error": f"{error:g}", "band": f"{band[0]:g} to {band[1]:g} Hz"}
         modes = make(chosen.n_modes)
         return Selection(
@@ -215,7 +246,7 @@ def _by_subspaces(make: _Maker, judge: _Judge, reference: FullReference, error: 
         n, first = min(make.n_most, 2 * n), n + 1
 
 
-def _by_bisection(make: _Maker, judge: _Judge, reference: FullReference, error: float) -> Iterator[Trial]:
+def _by_recomputation(make: _Maker, judge: _Judge, reference: FullReference, error: float) -> Iterator[Trial]:
     """Step (3): recompute the set for each number of modes, and find the smallest by doubling and bisection."""
     basis, n_r = _reference_basis(make, reference)
 
@@ -228,15 +259,61 @@ def _by_bisection(make: _Maker, judge: _Judge, reference: FullReference, error: 
             return Trial(n, 0, np.inf, str(problem))
         return Trial(n, len(modes.labels), *judge(subset.basis, c.at_ports))
 
-    low, high = -1, 0
+    yield from _by_bisection(tried, 0, make.n_most, error)
+
+
+def _by_estimate(make: _Maker, band: tuple[float, float], error: float) -> Iterator[Trial]:
+    """Step (4): estimate the errors of the frequencies of each set, and find the smallest set.
+
+    Raises
+    ------
+    ModeSetError
+        If the band holds no mode.
+    EigenError
+        If the modes cannot be counted.
+    """
+    families, time = make.families, make.families.body.units.time
+    n_band = families.free.count_below((2 * np.pi * band[1] * time) ** 2)
+    if not n_band:
+        raise ModeSetError(
+            f"select_modes: no elastic free mode of body {families.body.name!r} lies below {band[1]:g} Hz; widen the "
+            "band, or measure the frf"
+        )
+
+    def tried(n: int) -> Trial:
+        try:
+            modes = make(n)
+            basis = free_basis(families.body, modes, families)
+        except ModeSetError as problem:
+            return Trial(n, 0, np.inf, str(problem))
+        n_columns, found = len(modes.labels), basis.frequencies(time)
+        if len(found) < n_band:
+            return Trial(n, n_columns, np.inf, f"has {len(found)} elastic modes, the band holds mode {n_band}")
+        errors = frequency_errors(families, basis, n_band).frequency
+        if found[n_band - 1] / (1 + errors[-1]) > (1 + error) * band[1]:
+            return Trial(n, n_columns, np.inf, f"lacks one of the {n_band} elastic modes of the band")
+        errors = SAFETY * np.where(found[:n_band] >= band[0], errors, 0.0)
+        k = int(np.argmax(errors))
+        where = (
+            f"largest at free mode {k + 1}, {found[k]:.5g} Hz, and twice its estimate; all {n_band} elastic modes up "
+            f"to {band[1]:g} Hz are there, as counted"
+        )
+        return Trial(n, n_columns, float(errors[k]), where)
+
+    yield from _by_bisection(tried, min(FEWEST, make.n_most), make.n_most, error)
+
+
+def _by_bisection(tried: Callable[[int], Trial], first: int, n_most: int, error: float) -> Iterator[Trial]:
+    """Yield the results of doubled numbers of modes until one meets the error, then those of a bisection."""
+    low, high = -1, first
     while True:
         trial = tried(high)
         yield trial
         if trial.error <= error:
             break
-        if high >= make.n_most:
+        if high >= n_most:
             return
-        low, high = high, min(make.n_most, max(1, 2 * high))
+        low, high = high, min(n_most, max(1, 2 * high))
     while high - low > 1:
         middle = (low + high) // 2
         trial = tried(middle)
@@ -264,8 +341,7 @@ def _sentence(
     return text
 
 
-def check_request(name: str, error: float, band: tuple[float, float]) -> None:
-    """Raise `ModeSetError` if the name of the set, the error or the band is not valid."""
+def _check(name: str, error: float, band: tuple[float, float]) -> None:
     if name not in MODE_SETS:
         raise ModeSetError(f"select_modes: unknown mode set {quoted(name)}{nearest(name, MODE_SETS)}")
     if "n_modes" not in inspect.signature(MODE_SETS[name]).parameters:

@@ -93,7 +93,7 @@ def body_record(body: ReducedBody) -> dict[str, Any]:
         },
         "geometric_stiffness": body.geometric is not None,
         "quadratic_modes": body.quadratic is not None,
-        "errors": None if body.errors is None else errors_record(body, body.errors),
+        "errors": None if body.errors is None else errors_record(body.errors),
         "recovery": [
             {
                 "name": table.name,
@@ -111,10 +111,9 @@ def body_record(body: ReducedBody) -> dict[str, Any]:
     }
 
 
-def errors_record(body: ReducedBody, errors: ErrorEstimates) -> dict[str, Any]:
+def errors_record(errors: ErrorEstimates) -> dict[str, Any]:
     """Return the estimated errors as plain types; what is not finite becomes None."""
     return {
-        "frequencies_hz": in_hertz(body, errors.frequencies).tolist(),
         "frequency": errors.frequency.tolist(),
         "bound": errors.bound.tolist(),
         "distance": [_finite(x) for x in errors.distance],

@@ -146,10 +146,9 @@ ENTRIES = {
         "(n_columns, n_q)",
         "forces of the modes on the columns, scaled; A F: part of a column in a mode's energy", RATE,
     ),
-    "/errors/frequencies": Entry(
-        "(n_judged,)", "free frequencies of which the errors were estimated, ascending, cycles per time unit", RATE,
+    "/errors/frequency": Entry(
+        "(n_judged,)", "estimate of f_reduced / f - 1 of the lowest free frequencies; the exact error is not smaller",
     ),
-    "/errors/frequency": Entry("(n_judged,)", "estimate of f_reduced / f - 1; the exact error is not smaller"),
     "/errors/bound": Entry("(n_judged,)", "rigorous bound of |(f_reduced / f)^2 - 1| for some exact frequency f"),
     "/errors/shape": Entry(
         "(n_judged,)", "estimated error of the shape in the norm of strain energy, relative to the shape",

@@ -74,7 +74,6 @@ def scaled_body(reduced: ReducedBody, mass: float, stiffness: float) -> ReducedB
         K=made.K * ratio,
         D=made.D * root,
         free_frequencies=made.free_frequencies * root,
-        errors=None if made.errors is None else replace(made.errors, frequencies=made.errors.frequencies * root),
         stress=None if made.stress is None else made.stress * ratio,
         point_stress=None
         if made.point_stress is None

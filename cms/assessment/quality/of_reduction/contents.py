@@ -309,7 +309,6 @@ def compare_errors(case: Case) -> Iterator[Compared]:
     for name in ("method", "interface_loads"):
         yield same(f"errors.{name}", getattr(file, name), getattr(expected, name))
     yield same("errors.date", bool(file.date), True)
-    yield apart("errors.frequencies", file.frequencies, expected.frequencies, expected.frequencies, axes="mode")
     for name in ("frequency", "bound", "shape"):
         wanted = getattr(expected, name)
         yield apart(f"errors.{name}", getattr(file, name), wanted, wanted + ROUNDING_OF_ERRORS, axes="mode")

@@ -109,7 +109,6 @@ FIELDS: Mapping[str, str] = {
     "recovery.static": "recovery-rows",
     "recovery.system": "recovery-rows",
     "recovery.truncated": "recovery-rows",
-    "errors.frequencies": "error-estimates",
     "errors.frequency": "error-estimates",
     "errors.bound": "error-estimates",
     "errors.shape": "error-estimates",

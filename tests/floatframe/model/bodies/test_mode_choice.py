@@ -34,7 +34,4 @@ def test_errors_belong_to_all_modes_and_no_added_mass():
     assert len(reduced.errors.frequency)
     assert with_modes(reduced, [4, 1]).errors is None
     assert with_masses(reduced, [AddedMass("left", 0.4)]).errors is None
-    scaled = scaled_body(reduced, 0.8, 1.3).errors
-    ratio = np.sqrt(1.3 / 0.8)
-    assert_allclose(scaled.frequencies, ratio * reduced.errors.frequencies, rtol=1e-12)
-    assert_allclose(scaled.frequency, reduced.errors.frequency, rtol=0, atol=0)
+    assert_allclose(scaled_body(reduced, 0.8, 1.3).errors.frequency, reduced.errors.frequency, rtol=0, atol=0)
