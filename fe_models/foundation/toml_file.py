@@ -204,16 +204,15 @@ def describe(model: type[BaseModel], detail: ErrorDetails, data: Any = None) -> 
         title = parent.model_config.get("title") if parent is not None else None
         kind = "" if title is None else f' of type "{title}"'
         return f"{key}: unknown key{kind}{nearest(str(location[-1]), fields)}"
-    expected = expected_at(model, location, data)
     if detail["type"] == "missing":
-        return f"{key}: missing; expected {expected}"
+        return f"{key}: missing; expected {expected_at(model, location, data)}"
     if detail["type"] == "value_error":
         text = str(detail["ctx"]["error"])
         shows_value = location and not isinstance(detail["input"], dict | BaseModel)
         return (
             f"{key} = {quoted_value(detail['input'])}: {text}" if shows_value else f"{key}: {text}".removeprefix(": ")
         )
-    return f"{key} = {quoted_value(detail['input'])}: expected {expected}"
+    return f"{key} = {quoted_value(detail['input'])}: expected {expected_at(model, location, data)}"
 
 
 def expected_at(model: type[BaseModel], location: Location, data: Any = None) -> str:
