@@ -4,15 +4,14 @@ A new class with a name in a registry, such as `JOINTS`, is all that a new kind 
 JSON schema and the reference page of the keys follow from the class.
 """
 
-import inspect
 import logging
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import MISSING, dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field, is_dataclass
 from functools import cache
 from pathlib import Path
 from types import GenericAlias, NoneType, UnionType
-from typing import Annotated, Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin
 
 import numpy as np
 import pydantic
@@ -31,6 +30,7 @@ from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
 from cms.body.address import Address
 from fe_models.foundation.toml_file import Matrix3, Table, choice, existing_file, is_no_number
 from floatframe.errors import ModelError, SignalError
+from floatframe.files.system_file.class_fields import ClassField, class_fields, summary_of
 from floatframe.files.system_file.coordinate_section import CoordinateSection, NamedCoordinate
 from floatframe.files.system_file.keys import Name, tuple_of_list
 from floatframe.files.system_file.place_key import (
@@ -87,7 +87,7 @@ class AcceptedTable(FieldsTable):
 
     def object_named(self, name: str = "", signals: Signals = None) -> Any:
         """Return the object of the table."""
-        return self.object_with(signals, **({"name": name} if "name" in hints_of(self.described) else {}))
+        return self.object_with(signals, **({"name": name} if "name" in class_fields(self.described) else {}))
 
     def require_accepted(self) -> None:
         """Raise the error of the class if it does not accept the values."""
@@ -134,17 +134,16 @@ class DescribedSection(AcceptedTable):
     def object_named(self, name: str = "", signals: Signals = None) -> Any:
         """Return the object of the table."""
         given: dict[str, Any] = {}
-        for each in parts_of(self.described):
-            hint = hints_of(self.described)[each.name]
-            if is_marker(each.name, hint):
+        for each in class_fields(self.described).values():
+            if is_marker(each):
                 keys = marker_keys(each.name, is_measured=self.is_measured)
                 values = {role: getattr(self, key) for role, key in keys.items()}
                 if values["body"] is not None:
-                    is_body = str in get_args(hint) and all(values[role] is None for role in ("place", "triad"))
+                    is_body = str in get_args(each.hint) and all(values[role] is None for role in ("place", "triad"))
                     given[each.name] = values["body"] if is_body else marker_of(**values)
                 elif stray := [keys[role] for role, value in values.items() if value is not None]:
                     raise ModelError(f"{keys['body']}: missing; expected the name of the body of {stray[0]}")
-            elif is_named(hint, self.type):
+            elif is_named(each.hint, self.type):
                 given[each.name] = self.type
             elif each.name in self.model_fields_set:
                 given[each.name] = python_value(getattr(self, each.name), signals)
@@ -169,36 +168,10 @@ def python_value(value: Any, signals: Signals) -> Any:
 # keys of a class ------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Part:
-    """A field of a dataclass, or an argument of a function, with its default; `MISSING` if it has none."""
-
-    name: str
-    default: Any
-
-
-def parts_of(kind: Any, left_out: tuple[str, ...] = ("name",)) -> list[Part]:
-    """Return the fields of a dataclass, or the arguments of a function, without those that are left out."""
-    if is_dataclass(kind):
-        own = [each for each in fields(kind) if each.init]
-        found = [
-            (each.name, each.default if each.default_factory is MISSING else each.default_factory()) for each in own
-        ]
-    else:
-        given = inspect.signature(kind).parameters.values()
-        found = [(each.name, MISSING if each.default is each.empty else each.default) for each in given]
-    return [Part(name, default) for name, default in found if name not in left_out]
-
-
-@cache
-def hints_of(kind: Any) -> dict[str, Any]:
-    """Return the types of the fields of a class."""
-    return get_type_hints(kind)
-
-
-def is_marker(name: str, hint: Any) -> bool:
+def is_marker(each: ClassField) -> bool:
     """Whether a field is a marker, which has keys for its body, its place and its axes."""
-    return (name.startswith("marker") or name == "relative_to") and Marker in (hint, *get_args(hint))
+    is_place = each.name.startswith("marker") or each.name == "relative_to"
+    return is_place and Marker in (each.hint, *get_args(each.hint))
 
 
 def is_named(hint: Any, kind: str) -> bool:
@@ -222,54 +195,37 @@ OF_MESH = {
 }
 
 
-def fields_of_marker(name: str, meaning: str, *, is_measured: bool, is_needed: bool) -> dict[str, Any]:
+def fields_of_marker(each: ClassField, *, is_measured: bool) -> dict[str, Any]:
     """Return the keys of a marker with their types and descriptions."""
-    keys = marker_keys(name, is_measured=is_measured)
-    text = ": ".join(filter(None, (f"an interface, or a position [x, y, z] in {keys['body']}", meaning)))
+    keys = marker_keys(each.name, is_measured=is_measured)
+    text = ": ".join(filter(None, (f"an interface, or a position [x, y, z] in {keys['body']}", each.meaning)))
     parts = {
         "body": (Name, 'the name of a body, or "ground"'),
         "place": (MeasuredPlace if is_measured else PlaceOnBody, text),
-        "triad": (Matrix3, f"the axes of {name}, [x axis, y axis, z axis]"),
+        "triad": (Matrix3, f"the axes of {each.name}, [x axis, y axis, z axis]"),
     } | OF_MESH
     found: dict[str, Any] = {}
     for role, key in keys.items():
         kind, description = parts[role]
-        if role == "body" and is_needed:
+        if role == "body" and each.is_required:
             found[key] = (kind, pydantic.Field(description=description))
         else:
             found[key] = (kind | None, pydantic.Field(None, description=description))
     return found
 
 
-def fields_of_value(name: str, hint: Any, meaning: str, *, is_needed: bool) -> dict[str, Any]:
-    """Return the key of a field with its type and description; none if a file cannot give its value."""
-    key = key_of(hint)
+def fields_of_value(each: ClassField, stated: tuple[type, ...] = ()) -> dict[str, Any]:
+    """Return the key of a field with its type and description; none if a file cannot give its value.
+
+    Fields whose default has one of the types `stated` must be stated in a file.
+    """
+    key = key_of(each.hint)
     if key is None:
         return {}
-    text = ": ".join(filter(None, (key.meaning, meaning)))
-    if is_needed:
-        return {name: (key.type, pydantic.Field(description=text))}
-    return {name: (key.type | None, pydantic.Field(None, description=text))}
-
-
-@cache
-def meanings_of(kind: Any) -> dict[str, str]:
-    """Return the descriptions of the fields of a class: from its docstring, and from comments that begin with `#:`."""
-    _, _, listed = (inspect.getdoc(kind) or "").partition("Parameters\n----------\n")
-    found = re.findall(r"^(\w.*)\n((?: +.*\n?)+)", listed.partition("\n\n")[0] + "\n", re.MULTILINE)
-    named = {name: text for names, text in found for name in names.split(", ")}
-    commented = r"((?:^    #: .*\n)*)^    (\w+): [^#\n]*(?:#: (.*))?$"
-    for before, name, after in re.findall(commented, source_of(kind), re.MULTILINE):
-        named.setdefault(name, before.replace("#:", "") + after)
-    return {name: " ".join(text.split()).removesuffix(".") for name, text in named.items()}
-
-
-def source_of(kind: Any) -> str:
-    """Return the source of a class, "" if there is none."""
-    try:
-        return inspect.getsource(kind)
-    except (OSError, TypeError):
-        return ""
+    text = ": ".join(filter(None, (key.meaning, each.meaning)))
+    if each.is_required or isinstance(each.default, stated):
+        return {each.name: (key.type, pydantic.Field(description=text))}
+    return {each.name: (key.type | None, pydantic.Field(None, description=text))}
 
 
 @cache
@@ -290,14 +246,11 @@ def section_of(name: str, kind: Any, place: str, stated: tuple[type, ...], is_me
         Whether places may be nodes, elements and sets of a mesh.
     """
     keys: dict[str, Any] = {}
-    hints, meanings = hints_of(kind), meanings_of(kind)
-    for each in parts_of(kind):
-        hint, meaning = hints[each.name], meanings.get(each.name, "")
-        if is_marker(each.name, hint):
-            keys |= fields_of_marker(each.name, meaning, is_measured=is_measured, is_needed=each.default is MISSING)
-        elif not is_named(hint, name):
-            is_needed = each.default is MISSING or isinstance(each.default, stated)
-            keys |= fields_of_value(each.name, hint, meaning, is_needed=is_needed)
+    for each in class_fields(kind).values():
+        if is_marker(each):
+            keys |= fields_of_marker(each, is_measured=is_measured)
+        elif each.name != "name" and not is_named(each.hint, name):
+            keys |= fields_of_value(each, stated)
     model = model_of_keys(kind, f"[{place}]", name, DescribedSection, keys)
     model.is_measured = is_measured
     return model
@@ -309,11 +262,11 @@ Model = TypeVar("Model", bound=FieldsTable)
 def model_of_keys(kind: Any, place: str, name: str, base: type[Model], keys: Mapping[str, Any]) -> type[Model]:
     """Return the model of the tables at a place that describe an object of a class and have these keys.
 
-    With a name, they also have the key `type` of this value.
+    With a name, they also have the key `type` of this value. No place: tables within others.
     """
     typed: dict[str, Any] = {"type": (Literal[name], pydantic.Field(description=f'"{name}"'))} if name else {}
-    summary = (inspect.getdoc(kind) or "").partition("\n\n")[0]
-    text = f'{place} of type "{name}": {summary}' if name else f"{place}: {summary}"
+    where = f'{place} of type "{name}"' if name else place
+    text = ": ".join(filter(None, (where, summary_of(kind))))
     title = {"title": name} if name else {}
     model = create_model(kind.__name__, __base__=base, __doc__=text, __cls_kwargs__=title, **typed, **keys)
     model.described = kind if isinstance(kind, type) else staticmethod(kind)
@@ -322,21 +275,14 @@ def model_of_keys(kind: Any, place: str, name: str, base: type[Model], keys: Map
 
 def keys_of_fields(kind: Any, left_out: tuple[str, ...] = ()) -> dict[str, Any]:
     """Return the keys of the fields of a dataclass or the arguments of a function; a marker is a table."""
-    meanings = meanings_of(kind)
-    keys: dict[str, Any] = {}
-    for each in parts_of(kind, left_out):
-        hint, meaning = hints_of(kind)[each.name], meanings.get(each.name, "")
-        keys |= fields_of_value(each.name, hint, meaning, is_needed=each.default is MISSING)
-    return keys
+    found = [fields_of_value(each) for name, each in class_fields(kind).items() if name not in left_out]
+    return {name: key for each in found for name, key in each.items()}
 
 
 @cache
 def fields_table_of(kind: Any, left_out: tuple[str, ...] = ()) -> type[FieldsTable]:
     """Return the model of the tables whose keys are the fields of a dataclass, without those that are left out."""
-    summary = (inspect.getdoc(kind) or "").partition("\n\n")[0]
-    model = create_model(kind.__name__, __base__=FieldsTable, __doc__=summary, **keys_of_fields(kind, left_out))
-    model.described = kind
-    return model
+    return model_of_keys(kind, "", "", FieldsTable, keys_of_fields(kind, left_out))
 
 
 @dataclass(frozen=True)
@@ -571,14 +517,13 @@ MotionSection = Annotated[FunctionTable, OneFunction(TIME_FUNCTIONS, "joints.NAM
 @cache
 def function_table_of(kind: str) -> type[FunctionTable]:
     """Return the model of the tables of a function; a signal is named, and pieces are tables of functions."""
-    special = {
-        "signal": (Name, pydantic.Field(description="the name of a table [signals.NAME]")),
-        "pieces": (
-            Annotated[list[MotionSection], WithJsonSchema({"type": "array", "items": {"type": "object"}})],
-            pydantic.Field(description=f"a list of tables: {meanings_of(TIME_FUNCTIONS[kind]).get('pieces')}"),
-        ),
-    }
-    keys = {key: special.get(key, value) for key, value in keys_of_fields(TIME_FUNCTIONS[kind]).items()}
+    keys = keys_of_fields(TIME_FUNCTIONS[kind])
+    if "signal" in keys:
+        keys["signal"] = (Name, pydantic.Field(description="the name of a table [signals.NAME]"))
+    if "pieces" in keys:
+        tables = Annotated[list[MotionSection], WithJsonSchema({"type": "array", "items": {"type": "object"}})]
+        meaning = class_fields(TIME_FUNCTIONS[kind])["pieces"].meaning
+        keys["pieces"] = (tables, pydantic.Field(description=f"a list of tables: {meaning}"))
     return model_of_keys(TIME_FUNCTIONS[kind], "[joints.NAME.motions.COORDINATE]", kind, FunctionTable, keys)
 
 
