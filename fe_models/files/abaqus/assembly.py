@@ -110,14 +110,14 @@ def only_part(where: str, blocks: list[DeckBlock]) -> tuple[list[DeckBlock], lis
     name = instances[0][0].parameters.get("NAME", "").upper() if instances else ""
     found = [*(b for part in parts.values() for b in part), *(b for _, extra in instances for b in extra)]
     left_out = 0
-    for block in own:
+    for block in [*own, *model]:
         is_of_part = block.keyword in ("NSET", "ELSET") and block.parameters.get("INSTANCE", "").upper() == name != ""
         if is_of_part or block.keyword not in SETS:
             found.append(block)
         else:
             left_out += 1
-    words = "blocks of nodes, elements or sets of the assembly itself (such as reference points) were left out"
-    return [*found, *model], [f"{left_out} {words}"] if left_out else []
+    words = "blocks of nodes, elements or sets outside the part (such as reference points) were left out"
+    return found, [f"{left_out} {words}"] if left_out else []
 
 
 def _sorted(

@@ -456,7 +456,16 @@ def test_abaqus_part_with_one_instance_reads_like_a_flat_deck(tmp_path):
     )
     assert len(mesh.nodes) == 4
     assert {name: list(nodes) for name, nodes in mesh.node_sets.items()} == {"inside": [0], "tip": [3]}
-    assert mesh.notes[0].startswith("2 blocks of nodes, elements or sets of the assembly itself")
+    assert mesh.notes[0].startswith("2 blocks of nodes, elements or sets outside the part")
+
+
+def test_a_set_outside_the_part_is_read_only_if_it_names_the_instance(tmp_path):
+    deck = part_deck("*INSTANCE, NAME=p-1, PART=p\n*END INSTANCE\n")
+    outside = "*NSET, NSET={}\n2,\n"
+    text = outside.format("before") + deck + outside.format("tip, INSTANCE=p-1") + outside.format("other, INSTANCE=q")
+    mesh = read_text(tmp_path, "rod.inp", text)
+    assert {name: list(nodes) for name, nodes in mesh.node_sets.items()} == {"inside": [0], "tip": [1]}
+    assert mesh.notes[0].startswith("2 blocks of nodes, elements or sets outside the part")
 
 
 @pytest.mark.parametrize(
