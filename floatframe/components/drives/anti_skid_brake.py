@@ -75,7 +75,7 @@ class AntiSkidBrake(Element):
     time_constant: float = LAG  #: time constant of valve and brake [s]
     friction_speed: float = FRICTION_SPEED  #: speed scale of the disc friction [rad/s]; a locked wheel creeps below it
     speed: float = 0.0  #: initial speed of the wheel [rad/s]
-    anti_skid: bool = True
+    anti_skid: bool = True  #: whether the valve releases pressure before the wheel locks
     axis: GivenArray = given(Y_AXIS)  #: in the axes of marker a, (3,)
 
     def __post_init__(self) -> None:

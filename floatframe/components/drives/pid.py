@@ -36,13 +36,13 @@ class Pid:
     """
 
     target: TimeFunction | float  #: desired value as a function of time
-    kp: float
+    kp: float  #: gain of the error [unit of the output over that of the controlled value]
     ki: float = 0.0  #: gain of the integral [1/s times the unit of kp]
     kd: float = 0.0  #: gain of the derivative [s times the unit of kp]
     filter_time: float | None = None  #: time constant of the derivative filter, required with kd [s]
     lower: float | None = None  #: lower limit of the output; None: no limit
     upper: float | None = None  #: upper limit of the output; None: no limit
-    anti_windup: str = "clamping"
+    anti_windup: str = "clamping"  #: limit of the integral: "clamping" or "back-calculation"
     tracking_time: float | None = None  #: time constant of back-calculation (anti-windup) [s]
     integral: float = 0.0  #: initial value of the integral part I
 

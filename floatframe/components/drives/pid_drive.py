@@ -38,7 +38,7 @@ class PidDrive(Element):
     marker_a: Marker
     marker_b: Marker
     controller: Pid
-    controlled: str = "angle"
+    controlled: str = "angle"  #: quantity that the controller controls: "angle", "speed", "distance" or "rate"
     axis: GivenArray = given(Z_AXIS)  #: axis in axes of marker a, (3,)
     time_constant: float = 0.0  #: time constant of the actuator [s]
 

@@ -52,7 +52,7 @@ class TorqueMap(Element):
     efficiency_torques: Sequence[float] | None = None  #: increasing absolute motor torques of the efficiency map [N m]
     #: efficiencies, with a row for each of `speeds` and a column for each torque
     efficiencies: Sequence[Sequence[float]] | None = None
-    controlled: str = "speed"
+    controlled: str = "speed"  #: quantity that the controller controls: "speed"
 
     def __post_init__(self) -> None:
         where = f"element {self.name!r}"

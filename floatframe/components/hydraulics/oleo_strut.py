@@ -74,7 +74,7 @@ class OleoStrut(Element):
     #: area of the orifice during extension [m²]; None: equal to `area`
     recoil_area: TimeFunction | float | None = field(default=None, metadata=NOT_OF_TIME)
     exponent: float = 1.3  #: polytropic exponent n of the gas
-    discharge: float = 0.9
+    discharge: float = 0.9  #: discharge coefficient of the orifice
     oil_volume: float | None = None  #: volume of the oil chamber [m³]; None: incompressible oil
     friction: float = 0.0  #: friction of the seals [N]
     friction_area: float = 0.0  #: additional friction of the seals divided by the gas pressure [m²]

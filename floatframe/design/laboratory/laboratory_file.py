@@ -67,7 +67,7 @@ class ReferenceTable(Table):
     mode_set: str = Field("craig-bampton", description="the name of a mode set")
     n_modes: int = Field(10, ge=0, description="a whole number from 0")
     frame: str = Field("tisserand", description='"tisserand", "buckens" or "nodal:INTERFACE"')
-    stiffening: bool = Field(True, description="true or false")
+    stiffening: bool = Field(True, description="true or false: whether loads and spin stiffen the bodies")
     parts: int = Field(1, ge=1, description="a whole number from 1")
 
     @model_validator(mode="after")

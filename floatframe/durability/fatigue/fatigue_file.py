@@ -280,7 +280,7 @@ class CurveSection(Table):
 class MaterialSection(Table):
     """[material]: strengths and the S-N curve, in one stress unit."""
 
-    name: str = Field("", description="text")
+    name: str = Field("", description="the name of the material, for reports")
     stress_unit: choice("stress unit", lambda: tuple(STRESS_UNITS)) = Field(  # type: ignore[valid-type]
         description=f"the unit of all stresses of the material, one of {', '.join(STRESS_UNITS)}"
     )
