@@ -22,7 +22,7 @@ def test_a_tutorial_works_and_prints_and_draws_what_it_shows(page, tmp_path):
         assert size_of(shown) == size_of(folder / name)
 
 
-@pytest.mark.parametrize("page", TUTORIALS)
+@pytest.mark.parametrize("page", PAGES)
 def test_a_tutorial_is_short_and_ends_with_exercises_and_where_to_go(page):
     text = (DOCS / f"{page}.md").read_text()
     for remark, language, _ in blocks(page):
