@@ -36,8 +36,8 @@ def put(text: str, target: Path) -> None:
 
 
 def links_in_place(app: Sphinx, docname: str, content: list[str]) -> None:
-    """Change the links of copied pages, which are relative to the top of the checkout, to the pages of the site."""
-    if docname.startswith("project/"):
+    """Change links of copied pages, which are those of the checkout, to the pages of the site."""
+    if docname.startswith(("project/", "notebooks/")):
         content[0] = re.sub(r"\]\((\.\./)?docs/", "](../", content[0])
 
 
