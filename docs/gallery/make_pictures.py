@@ -24,19 +24,20 @@ from scipy.spatial.transform import Rotation
 import cms
 import fe_models as fm
 import floatframe as ff
-from cms.assessment.rendering import Lines, Surface, render_animation
+from cms.assessment.rendering import Lines, Scene, Surface, render_animation
 from fe_models.foundation.parametric_file import read_parametric
 from floatframe.components import mechanisms
 from floatframe.files.system_file.read_system import read_system
 from floatframe.model.functions.time_functions import cycloidal_spin_up
-from floatframe.pictures.animation import animate, motion_scene
-from floatframe.pictures.film_times import film_times
+from floatframe.pictures.animation import motion_scene
+from floatframe.pictures.film_times import film_times, speed_words
 from floatframe.results.results_file import MemorySource
 
 HERE = Path(__file__).resolve().parent
 NOTEBOOKS = HERE.parents[1] / "notebooks"
 WIDTH = 480  #: of stills and films [px]
 COLORS = 128
+TEXT_SCALE = 1.9  #: texts can be read at the width of a card
 
 
 def slider_crank() -> None:
@@ -48,10 +49,8 @@ def slider_crank() -> None:
         cms.write(cms.reduce_job(Path(folder) / "rod.toml"), Path(folder) / "rod.h5")
         system, run = read_system(Path(folder) / "crank.toml")
         motion = ff.integrate(system, run.integrator, t_end=run.t_end, h=run.h, output_every=2)
-        film, n = Path(folder) / "film.gif", 38  # pictures of one revolution, 15 per second, 100 times slower
-        animate(motion, drawn(system), film, speed=0.01, fps=15, magnification=1.0, system=system)
-        frames = [cut(frame) for frame in iio.imread(film)[-n:]]
-    save_film(frames, HERE / "slider_crank.gif", fps=15)
+    frames = frames_of(motion, system, "Slider-crank with a slender rod", speed=0.01, fps=15)
+    save_film(frames[-38:], HERE / "slider_crank.gif", fps=15)  # one revolution
 
 
 def antenna() -> None:
@@ -65,9 +64,7 @@ def antenna() -> None:
             cms.write(cms.reduce_job(folder / f"{part}.toml"), folder / f"{part}.h5")
         system, run = read_system(folder / "bare.toml")
         motion = ff.kinematics(system, np.linspace(0.0, run.t_end, 41), elasticity=ff.analyses.quasi_static_bodies)
-        film = folder / "film.gif"
-        animate(motion, drawn(system), film, speed=run.t_end / 4, fps=10, magnification=1.0, system=system)
-        frames = [frame[..., :3] for frame in iio.imread(film)]
+    frames = frames_of(motion, system, "Deployable antenna", speed=run.t_end / 4, fps=10)
     save_film(frames, HERE / "antenna.gif", fps=10)
 
 
@@ -80,14 +77,13 @@ def landing_gear() -> None:
         copy_machine("landing-gear", folder)
         system, run = read_system(folder / "retraction.toml")
         motion = ff.integrate(system, run.integrator, 6.0, h=run.h, output_every=50)
-        film = folder / "film.gif"
-        animate(motion, drawn(system), film, speed=2.0, fps=10, magnification=1.0, system=system)
-        frames = [cut(frame) for frame in iio.imread(film)]
-    size = min(len(frame) for frame in frames)
-    save_film([frame[:size] for frame in frames], HERE / "landing_gear.gif", fps=10)
+    frames = frames_of(motion, system, "Retraction of a landing gear", speed=2.0, fps=10)
+    save_film(frames, HERE / "landing_gear.gif", fps=10)
 
 
-def landing_gear_running(case: str, t_begin: float, t_end: float, *, magnification: float, speed: float) -> None:
+def landing_gear_running(
+    case: str, title: str, t_begin: float, t_end: float, *, magnification: float, speed: float
+) -> None:
     """A moving landing gear: braking with anti-skid on the wet patch, or the shimmy limit cycle."""
     from floatframe.machines import copy_machine
 
@@ -98,25 +94,17 @@ def landing_gear_running(case: str, t_begin: float, t_end: float, *, magnificati
             cms.write(cms.reduce_job(folder / f"{part}.toml"), folder / f"{part}.h5")
         system, run = read_system(folder / f"{case}.toml")
         motion = ff.integrate(replace(system, scene=()), run.integrator, t_end, h=run.h, output_every=5)
-        rows = motion.t >= t_begin
-        arrays = {key: values[rows] for key, values in motion.source.arrays.items() if len(values) == len(rows)}
-        arrays["position"] = arrays["position"] - motion.body("carriage").r[rows, None] * [1, 0, 0]
-        motion = replace(motion, source=MemorySource(arrays))
-        film = folder / "film.gif"
-        animate(motion, drawn(system), film, speed=speed, fps=12, magnification=magnification)
-        frames = [cut(frame) for frame in iio.imread(film)]
-    size = min(len(frame) for frame in frames)
-    save_film([frame[:size] for frame in frames], HERE / f"landing_gear_{case}.gif", fps=12)
+    motion = followed(motion, motion.body("carriage").r * [1, 0, 0], motion.t >= t_begin)
+    frames = frames_of(motion, system, title, speed=speed, fps=12, magnification=magnification, has_glyphs=False)
+    save_film(frames, HERE / f"landing_gear_{case}.gif", fps=12)
 
 
-def still(name: str, make: Callable[[], tuple[ff.System, float, float]]) -> None:
+def still(name: str, title: str, make: Callable[[], tuple[ff.System, float, float]]) -> None:
     """The last instant of a motion; `make` returns system, end and step."""
     system, t_end, h = make()
     motion = ff.integrate(system, ff.GeneralizedAlpha(0.8), t_end=t_end, h=h, output_every=4)
-    with tempfile.TemporaryDirectory() as folder:
-        film = Path(folder) / "film.gif"
-        animate(motion, drawn(system), film, speed=t_end / 1.0, fps=12, system=system)
-        save_still(cut(iio.imread(film)[-1]), HERE / f"{name}.png")
+    frames = frames_of(motion, system, title, speed=t_end, fps=12, magnification=None)
+    save_still(frames[-1], HERE / f"{name}.png")
 
 
 def rod_of(length: float, *, height: float, width: float, young: float = 210e9, rho: float = 7850.0, n_modes: int = 4):
@@ -167,20 +155,17 @@ def bogie() -> None:
         system = vehicle(data, speed, laws=laws, frames=flexible_frames(data, frame, speed))
         system = replace(with_lateral_kick(system, 0.1), scene=())
         motion = ff.integrate(system, ff.GeneralizedAlpha(0.8, 1e-6), 2.0, 2e-3, output_every=2)
-        rows = motion.t >= 1.0
-        arrays = {key: values[rows] for key, values in motion.source.arrays.items() if len(values) == len(rows)}
-        arrays["position"] = (arrays["position"] - motion.body("body").r[rows, None] * [1, 0, 0]) * [1, larger, 1]
-        arrays["euler_parameters"] = turned_more(arrays["euler_parameters"], larger)
-        motion = replace(motion, source=MemorySource(arrays))
-        film = folder / "film.gif"
-        times = film_times(motion.t, fps=10, speed=0.2)
-        scene = motion_scene(motion, drawn(system), times, magnification=larger, system=system)
-        here = {name: tuple(each for each in getattr(scene, name) if is_front(each)) for name in ("surfaces", "lines")}
-        words = (f"front bogie at {speed:g} m/s, 5 times slower; sideways motion and bending {larger:g} times larger",)
-        render_animation(replace(scene, **here, captions=words), film, fps=times.fps)
-        frames = [cut(each) for each in iio.imread(film)]
-    size = min(len(each) for each in frames)
-    save_film([each[:size] for each in frames], HERE / "bogie.gif", fps=10)
+    rows = motion.t >= 1.0
+    arrays = {key: values[rows] for key, values in motion.source.arrays.items() if len(values) == len(rows)}
+    arrays["position"] = (arrays["position"] - motion.body("body").r[rows, None] * [1, 0, 0]) * [1, larger, 1]
+    arrays["euler_parameters"] = turned_more(arrays["euler_parameters"], larger)
+    motion = replace(motion, source=MemorySource(arrays))
+    times = film_times(motion.t, fps=10, speed=0.2)
+    scene = motion_scene(motion, drawn(system), times, magnification=larger, system=system)
+    here = {name: tuple(each for each in getattr(scene, name) if is_front(each)) for name in ("surfaces", "lines")}
+    caption = f"5 times slower; sideways motion {larger:g} times larger"
+    frames = frames_of_scene(replace(scene, **here, title=f"Bogie at {speed:g} m/s", captions=(caption,)), times.fps)
+    save_film(frames, HERE / "bogie.gif", fps=10)
 
 
 def is_front(drawn: Surface | Lines) -> bool:
@@ -216,9 +201,7 @@ def railway_engine() -> None:
         track = ff.shapes.Track([(-10, 0, 0), (17, 0, 0)], 1.5)
         system = replace(system, scene=(track,))
         motion = ff.integrate(system, run.integrator, t_end=1.05, h=run.h, output_every=30)
-        film = folder / "film.gif"
-        animate(motion, drawn(system), film, speed=0.1, fps=6, magnification=5000.0, system=system)
-        frames = [cut(frame) for frame in iio.imread(film)]
+    frames = frames_of(motion, system, "Railway engine over a rail defect", speed=0.1, fps=6, magnification=5000.0)
     save_film(frames, HERE / "railway_engine.gif", fps=6)
 
 
@@ -233,9 +216,8 @@ def kart() -> None:
         system, run = read_system(folder / "kart.toml", {"speed": 4.0, "steer_at": 0.15, "duration": 0.6})
         system = replace(system, scene=())
         motion = ff.integrate(system, run.integrator, t_end=run.t_end, h=run.h, output_every=10)
-        film = folder / "film.gif"
-        animate(motion, drawn(system), film, speed=0.2, fps=10, magnification=20.0, system=system)
-        frames = [cut(frame) for frame in iio.imread(film)]
+    motion = followed(motion, motion.body("chassis").r - motion.body("chassis").r[0])
+    frames = frames_of(motion, system, "Kart in a turn at 4 m/s", speed=0.2, fps=10, magnification=20.0)
     save_film(frames, HERE / "kart.gif", fps=10)
 
 
@@ -261,11 +243,8 @@ def road_car() -> None:
             changes[f"bodies.upright_{corner}.shapes"] = [wheel, *shapes]
         system, run = read_system(folder / "rig.toml", changes)
         motion = ff.integrate(system, run.integrator, run.t_end, h=run.h, output_every=5)
-        film = folder / "film.gif"
-        animate(motion, drawn(system), film, speed=0.5, fps=10, magnification=50.0, system=system)
-        frames = [cut(frame) for frame in iio.imread(film)]
-    size = min(len(frame) for frame in frames)
-    save_film([frame[:size] for frame in frames], HERE / "road_car.gif", fps=10)
+    frames = frames_of(motion, system, "Road car on four posts", speed=0.5, fps=10, magnification=50.0)
+    save_film(frames, HERE / "road_car.gif", fps=10)
 
 
 def road_car_plots() -> None:
@@ -368,9 +347,15 @@ MECHANISMS: dict[str, Callable[[], None]] = {
     "flexible_arm": flexible_arm,
     "road_car_plots": road_car_plots,
     "road_car_study": road_car_study,
-    "landing_gear_braking": partial(landing_gear_running, "braking", 1.9, 2.4, magnification=5.0, speed=0.1),
-    "landing_gear_shimmy": partial(landing_gear_running, "shimmy", 2.8, 3.0, magnification=1.0, speed=0.04),
-    **{maker.__name__: partial(still, maker.__name__, maker) for maker in (four_bar, satellite, chain)},
+    "landing_gear_braking": partial(
+        landing_gear_running, "braking", "Braking with anti-skid", 1.9, 2.4, magnification=5.0, speed=0.1
+    ),
+    "landing_gear_shimmy": partial(
+        landing_gear_running, "shimmy", "Shimmy of a nose gear", 2.8, 3.0, magnification=1.0, speed=0.04
+    ),
+    "four_bar": partial(still, "four_bar", "Four-bar linkage", four_bar),
+    "satellite": partial(still, "satellite", "Satellite turned by a torque", satellite),
+    "chain": partial(still, "chain", "Chain of five bars", chain),
 }
 
 
@@ -416,11 +401,35 @@ def drawn(system: ff.System) -> dict:
     return {body.name: getattr(body, "reduced", body) for body in system.bodies}
 
 
-def cut(frame: np.ndarray) -> np.ndarray:
-    """Return a frame without the empty rows above and below its content."""
-    busy = np.flatnonzero((np.ptp(frame[..., :3].astype(int), axis=1) > 12).any(axis=1))
-    low, high = max(busy.min() - 4, 0), min(busy.max() + 4, len(frame))
-    return frame[low : high + 1, :, :3]
+def followed(motion: ff.Trajectory, away: np.ndarray, rows: np.ndarray | slice = slice(None)) -> ff.Trajectory:
+    """Return some rows of a motion, seen from a point that moves by `away`, (n_t, 3) [m]."""
+    n = len(motion.t)
+    arrays = {key: values[rows] for key, values in motion.source.arrays.items() if len(values) == n}
+    arrays["position"] = arrays["position"] - away[rows, None]
+    return replace(motion, source=MemorySource(arrays))
+
+
+def frames_of(
+    motion: ff.Trajectory, system: ff.System, title: str, *, speed: float, fps: float,
+    magnification: float | None = 1.0, has_glyphs: bool = True,
+) -> list[np.ndarray]:  # fmt: skip
+    """Return the frames of a film, (height, width, 3) each, with texts that can be read at the width of a card."""
+    shapes = drawn(system)
+    times = film_times(motion.t * motion.units.time, fps=fps, speed=speed)
+    scene = motion_scene(
+        motion, shapes, times, magnification=magnification, system=system if has_glyphs else None
+    )  # fmt: skip
+    caption = "; ".join([speed_words(float(f"{speed:.2g}")), *scene.captions[0].split("; ")[1:]])
+    caption = caption.replace(" than real time", "").replace("elastic displacement drawn", "deformation")
+    return frames_of_scene(replace(scene, title=title, captions=(caption,)), times.fps)
+
+
+def frames_of_scene(scene: Scene, fps: float) -> list[np.ndarray]:
+    """Return the frames of a scene without the names of its places."""
+    with tempfile.TemporaryDirectory() as folder:
+        film = Path(folder) / "film.gif"
+        render_animation(replace(scene, triads=(), text_scale=TEXT_SCALE), film, fps=fps)
+        return [frame[..., :3] for frame in iio.imread(film)]
 
 
 def save_still(frame: np.ndarray, path: Path, *, width: int = WIDTH) -> None:

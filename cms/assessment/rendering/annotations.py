@@ -30,7 +30,7 @@ class Layout:
 def layout_of(scene: Scene) -> Layout:
     """Return the layout of a scene: text at the top, colour bar on the right, and the view in the remaining area."""
     width, height = scene.size
-    unit = max(round(min(width / 1280, height / 800) * 19), 9)
+    unit = max(round(min(width / 1280, height / 800) * 19 * scene.text_scale), 9)
     top = unit
     if scene.title:
         top += round(1.9 * unit)

@@ -42,7 +42,7 @@ class Camera:
 
 
 def fitted_camera(scene: Scene, size: tuple[int, int]) -> Camera:
-    """Return a camera along the view direction of the scene that shows every point of every frame.
+    """Return a camera along the view direction of the scene that shows every point of every frame but of a backdrop.
 
     A point at (x, y, z) from the centre, in camera axes, is visible if |x| <= a_x (d + z) and |y| <= a_y (d + z), where
     d is the distance of the centre. The required d is a maximum over the points. The centre is then moved to the middle
@@ -71,7 +71,11 @@ def fitting_distance(relative: Array, half: Array) -> float:
 
 
 def seen_points(scene: Scene) -> Array:
-    """Return the points that must be in the picture, (n, 3): all nodes, since bounding boxes would waste space."""
+    """Return the points that must be in the picture, (n, 3): all nodes, since bounding boxes would waste space.
+
+    A backdrop, such as a ground, may reach beyond the picture.
+    """
+    lines = [lines for lines in scene.lines if not lines.is_backdrop or not scene.surfaces]
     found = [surface.nodes[..., np.unique(surface.triangles), :].reshape(-1, 3) for surface in scene.surfaces]
-    found += [lines.points[..., np.unique(lines.segments), :].reshape(-1, 3) for lines in scene.lines]
+    found += [each.points[..., np.unique(each.segments), :].reshape(-1, 3) for each in lines]
     return np.concatenate([part for part in found if len(part)])

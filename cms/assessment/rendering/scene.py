@@ -124,6 +124,7 @@ class Scene:
     up: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     background: str = "#fbfcfd"
     size: tuple[int, int] = (1280, 800)  #: width and height [px]
+    text_scale: float = 1.0  #: size of texts, relative to the usual one
 
     def __post_init__(self) -> None:
         put = object.__setattr__
