@@ -5,8 +5,9 @@ from typing import Annotated
 
 import typer
 
-from cms.cli.arguments import ModalFile, Output, SetValues, Workers
+from cms.cli.arguments import ModalFile, Output, SetValues, Workers, changes_of
 from cms.cli.console import commands, guarded, register, say
+from cms.cli.demo import demo_command
 from cms.cli.info import info_command, print_body
 from cms.cli.modes import view_command
 from cms.cli.reduce import Fleet, reduce_and_write_fleet, reduce_command
@@ -150,6 +151,7 @@ def converge_command(
     ratio: Annotated[float, typer.Option(help="Ratio of the coarser mesh size to that of the job.")] = 1.5,
     modes: Annotated[int, typer.Option(help="Number of elastic free modes to compare.")] = 10,
     json: Annotated[bool, typer.Option("--json", help="Write the numbers as JSON, for other programs.")] = False,
+    set_values: SetValues = [],  # noqa: B006
 ) -> None:
     """Mesh error of a CAD job, from two mesh sizes.
 
@@ -159,13 +161,14 @@ def converge_command(
     """
     from cms.cli.geometry import run_converge
 
-    run_converge(job, ratio=ratio, n_modes=modes, as_json=json)
+    run_converge(job, ratio=ratio, n_modes=modes, as_json=json, changes=changes_of(set_values))
 
 
 @guarded
 def modes_command(
     job: Annotated[Path, typer.Argument(help="Job file (TOML), see docs/job_file.md.")],
     json: Annotated[bool, typer.Option("--json", help="Write the list as JSON, for other programs.")] = False,
+    set_values: SetValues = [],  # noqa: B006
 ) -> None:
     """Describe the modes of a job; writes no file.
 
@@ -175,7 +178,7 @@ def modes_command(
     """
     from cms.cli.modes import list_modes
 
-    list_modes(job, as_json=json)
+    list_modes(job, as_json=json, changes=changes_of(set_values))
 
 
 @guarded
@@ -328,6 +331,7 @@ def check_command(
         float | None, typer.Option(help="Highest frequency of interest [Hz]; default: highest kept mode / 1.5.")
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the records as JSON, for other programs.")] = False,
+    set_values: SetValues = [],  # noqa: B006
 ) -> None:
     """Check a modal file: one verdict per check.
 
@@ -341,7 +345,7 @@ def check_command(
     """
     from cms.cli.verdicts.check import check_file
 
-    raise typer.Exit(check_file(file, job, band=band, as_json=json))
+    raise typer.Exit(check_file(file, job, band=band, as_json=json, changes=changes_of(set_values)))
 
 
 @guarded
@@ -365,6 +369,7 @@ def accept_command(
     output: Annotated[
         list[Path] | None, typer.Option("--output", "-o", help="Document: .pdf, .html or .json; repeatable.")
     ] = None,
+    set_values: SetValues = [],  # noqa: B006
 ) -> None:
     """Acceptance document of a body, to sign.
 
@@ -382,9 +387,12 @@ def accept_command(
 
     raise typer.Exit(
         run_accept(
-            AcceptRequest(file, full, deck, program, tuple(density or ()), band, most_dofs, strict, tuple(output or ()))
+            AcceptRequest(
+                file, full, deck, program, tuple(density or ()), band, most_dofs, strict, tuple(output or ()),
+                changes_of(set_values),
+            )
         )
-    )
+    )  # fmt: skip
 
 
 @guarded
@@ -408,6 +416,7 @@ def frf_command(
         list[Path] | None,
         typer.Option("--output", "-o", help="Picture (.png .svg .pdf) or table (.csv, ...); repeatable."),
     ] = None,
+    set_values: SetValues = [],  # noqa: B006
 ) -> None:
     """Frequency response between interfaces of the free body.
 
@@ -420,8 +429,11 @@ def frf_command(
     from cms.cli.frf import FrfRequest, run_frf
 
     run_frf(
-        FrfRequest(file, excited, answering, band, tuple(component or ()), damping, inertance, job, tuple(output or ()))
-    )
+        FrfRequest(
+            file, excited, answering, band, tuple(component or ()), damping, inertance, job, tuple(output or ()),
+            changes_of(set_values),
+        )
+    )  # fmt: skip
 
 
 @guarded
@@ -456,6 +468,7 @@ def compare_command(
             "dask://host:port, see docs/cluster.md; default: one after the other with one factorisation.",
         ),
     ] = None,
+    set_values: SetValues = [],  # noqa: B006
 ) -> None:
     """Compare mode sets with the full model.
 
@@ -474,9 +487,10 @@ def compare_command(
 
     run_compare(
         CompareRequest(
-            job, sets, modes, output, band, reference_modes, tuple(load or ()), pulse_at, motion, stills, workers
+            job, sets, modes, output, band, reference_modes, tuple(load or ()), pulse_at, motion, stills, workers,
+            changes_of(set_values),
         )
-    )
+    )  # fmt: skip
 
 
 @guarded
@@ -539,31 +553,16 @@ def split_command(
         reduce_and_write_fleet(Fleet(files[:-1], None, workers, None))
 
 
-@guarded
-def demo_command(
-    folder: Annotated[Path, typer.Argument(help="Folder for the files of the demo.")] = Path("demo"),
-) -> None:
-    """Run all steps with the included connecting rod.
-
-    Reduce, info, view, run, plot, animate: about a minute.
-
-    Example: cms demo
-    """
-    from cms.cli.demo import run_demo
-
-    run_demo(folder)
-
-
 register(
     app,
     {
-        "Start": {"demo": demo_command},
         "Model": {
+            "demo": demo_command,
             "job": job_command,
             "faces": faces_command,
             "converge": converge_command,
             "split": split_command,
-            "show": show_command,
+            "schema": schema_command_of("cms"),
         },
         "Reduce": {"run": run_command, "reduce": reduce_command, "modes": modes_command, "frame": frame_command},
         "Judge": {
@@ -579,9 +578,6 @@ register(
             "recovery": recovery_command,
             "formats": formats_command,
         },
-        "Look": {"info": info_command, "view": view_command},
-        "Set up": {
-            "schema": schema_command_of("cms"),
-        },
+        "Look": {"info": info_command, "view": view_command, "show": show_command},
     },
 )

@@ -134,6 +134,9 @@ def commands(name: str, help: str, *, hints: Mapping[str, str] | None = None) ->
                     param.help = "Complete words in this shell."  # type: ignore[attr-defined]
             return params
 
+        def format_help(self, ctx: Any, formatter: Any) -> None:
+            print_help(self, ctx)
+
         def resolve_command(self, ctx: Any, args: list[str]) -> Any:
             if args[0] in known:
                 given = " ".join(args[1:])
@@ -155,6 +158,27 @@ def commands(name: str, help: str, *, hints: Mapping[str, str] | None = None) ->
 
     options.__doc__ = help
     return app
+
+
+def print_help(program: TyperGroup, ctx: Any) -> None:
+    """Print options and commands, a line each under the line of their group: panels do not fit a screen."""
+    from rich.console import Console
+    from rich.table import Table
+
+    shown = [each for each in program.get_params(ctx) if not getattr(each, "hidden", False)]
+    groups = {"Options": [(", ".join(sorted(each.opts, key=len)), getattr(each, "help", "")) for each in shown]}
+    for name, command in program.commands.items():
+        heading = getattr(command, "rich_help_panel", None) or "Commands"
+        groups.setdefault(heading, []).append((name, command.get_short_help_str(limit=80)))
+    console = Console(highlight=False)
+    console.print(program.get_usage(ctx), program.help, "", sep="\n", markup=False)
+    for heading, rows in groups.items():
+        console.rule(f"[bold]{heading}", align="left", style="dim")
+        table = Table.grid(padding=(0, 1), pad_edge=True)
+        table.add_column(no_wrap=True, style="bold cyan")
+        for name, meaning in rows:
+            table.add_row(f"{name:<10}", meaning)
+        console.print(table)
 
 
 def version_option(name: str) -> Any:

@@ -1,4 +1,4 @@
-"""`cms demo`: all steps with an included rod that bends in a fast crank, one by one as a user would type them."""
+"""The command demo: all steps with an included rod that bends in a fast crank, one by one as a user would type them."""
 
 import os
 import subprocess
@@ -10,19 +10,32 @@ from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import IO
+from typing import IO, Annotated
 
 import typer
 
 import cms
-from cms.cli.console import print_table, say, stages
+from cms.cli.console import guarded, print_table, say, stages
 from cms.errors import JobError
 
-__all__ = ["run_demo"]
+__all__ = ["demo_command", "run_demo"]
 
 JOBS = ("rod.toml", "crank.toml")  #: job files included in this package
 MODE = 3
 FPS = 15  #: frames per second of the film of the motion, which lasts 8 s; drawing it takes most of the time
+
+
+@guarded
+def demo_command(
+    folder: Annotated[Path, typer.Argument(help="Folder for the files of the demo.")] = Path("demo"),
+) -> None:
+    """Run all steps with the included connecting rod.
+
+    Reduce, info, view, run, plot, animate: about a minute. Both programs have this command.
+
+    Example: cms demo
+    """
+    run_demo(folder)
 
 
 def run_demo(folder: Path) -> None:

@@ -1,8 +1,9 @@
 """The command `cms frf`: frequency response between two interfaces of a modal file, optionally with its full model."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -45,12 +46,15 @@ class FrfRequest:
     is_inertance: bool
     job: Path | None
     outputs: tuple[Path, ...]
+    changes: Mapping[str, Any]  #: values of parameters of the job
 
 
 def run_frf(request: FrfRequest) -> None:
     """Compute the response with points around all resonances, print its peaks, and write the requested files."""
     from cms.body.modal_file.file import read
 
+    if request.changes and request.job is None:
+        raise QualityError("--set: changes parameters of the job; give it with --job")
     frequencies = parse_band(request.band)
     pairs = tuple(parse_component(text) for text in request.components or MOTION_COMPONENTS[:3])
     inputs = [request.file] + ([request.job] if request.job else [])
@@ -121,7 +125,7 @@ def full_model(request: FrfRequest, reduced: ReducedBody, highest: float) -> tup
     from cms.modes.families.families import Families
 
     assert request.job is not None
-    job = read_job(request.job)
+    job = read_job(request.job, request.changes)
     with stages() as clock:
         uncoupled = uncoupled_body(job, clock)
         require_same_units(uncoupled, reduced)

@@ -1,7 +1,7 @@
 """The commands `cms faces` and `cms converge`: meshes and their faces."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,7 +24,7 @@ __all__ = ["FacesRequest", "run_converge", "run_faces"]
 # `cms converge`: free frequencies of a CAD job at two mesh sizes, and the estimated mesh error ------------------------
 
 
-def run_converge(path: Path, *, ratio: float, n_modes: int, as_json: bool) -> None:
+def run_converge(path: Path, *, ratio: float, n_modes: int, as_json: bool, changes: Mapping[str, Any]) -> None:
     """Print the frequencies for both mesh sizes, with the estimated error for the mesh size of the job.
 
     Raises
@@ -36,7 +36,7 @@ def run_converge(path: Path, *, ratio: float, n_modes: int, as_json: bool) -> No
     from cms.jobs.studies.mesh_convergence import ORDER, mesh_convergence
     from fe_models.foundation.units import unit_system
 
-    job = read_job(path)
+    job = read_job(path, changes)
     with stages() as clock:
         result = mesh_convergence(job, ratio=ratio, n_modes=n_modes, stages=clock)
     if as_json:

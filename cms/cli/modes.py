@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -71,14 +72,14 @@ FRAME_WORDS = {
 }
 
 
-def list_modes(path: Path, *, as_json: bool) -> None:
+def list_modes(path: Path, *, as_json: bool, changes: Mapping[str, Any]) -> None:
     """Compute the mode set and the reduced body of a job, and print their contents without writing a file."""
     from cms.jobs.body_of_job import job_body
     from cms.jobs.job import read_job
     from cms.jobs.mode_set_of_job import frame_of, job_mode_set, reduction_of
     from cms.reduction.reduction import reduce
 
-    job = read_job(path)
+    job = read_job(path, changes)
     with stages() as clock:
         body = job_body(job, clock)
         with clock(f"mode set {job.reduction.set}"):

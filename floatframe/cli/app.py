@@ -29,6 +29,7 @@ from cms.cli.console import (
     say,
     stages,
 )
+from cms.cli.demo import demo_command
 from cms.cli.outputs import PICTURES, output_file, write_outputs
 from cms.cli.schema import schema_command_of
 from cms.cli.show import show_command
@@ -47,7 +48,6 @@ app = commands(
     "floatframe",
     "Flexible multibody dynamics: bodies from modal files, joints and forces become motion.",
     hints={
-        "demo": "cms demo",
         "eig": "floatframe modes FILE",
         "study": "floatframe compare FILE",
         "machine": "floatframe example NAME",
@@ -473,7 +473,7 @@ def animate_command(
 register(
     app,
     {
-        "Start": {"example": prepare.example_command, "check": analyses.check_command},
+        "Start": {"demo": demo_command, "example": prepare.example_command, "check": analyses.check_command},
         "Compute": {
             "run": run_command,
             "resume": resume_command,
@@ -508,7 +508,7 @@ register(
             "import": exchange.import_command,
             "export": export.export_command,
         },
-        "Set up": {
+        "Setup": {
             "prepare": prepare.prepare_command,
             "schema": schema_command_of("floatframe"),
         },

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cms.cli.arguments import Journal, Workers
+from cms.cli.arguments import Journal, SetValues, Workers, changes_of
 from cms.cli.console import guarded, output_path, print_table, say, stages
 from cms.cli.outputs import DOCUMENTS, PICTURES, TABLES, json_text, output_files, write_outputs
 
@@ -158,6 +158,7 @@ def optimize_command(
     ] = [],  # noqa: B006
     journal: Journal = None,
     workers: Workers = None,
+    set_values: SetValues = [],  # noqa: B006
     json: Annotated[bool, typer.Option("--json", help="Write the result as JSON, for other programs.")] = False,
 ) -> None:
     """Find the best values of parameters within limits.
@@ -170,6 +171,10 @@ def optimize_command(
 
     Example: floatframe optimize study.toml -o history.csv -o history.png -o best.toml
 
+    With --set, other parameters of the system have these values in all evaluations.
+
+    Example: floatframe optimize study.toml --set length=0.4
+
     Example: floatframe optimize study.toml --workers dask://cluster:8786
     """
     from fe_models.foundation.tasks.workers import tasks_of
@@ -179,7 +184,7 @@ def optimize_command(
     from floatframe.errors import ModelError
     from floatframe.files.system_file.read_system import read_system
 
-    described = read_design(design)
+    described = read_design(design, changes_of(set_values))
     inputs = (design, Path(described.study.system), *read_system(described.study.system)[0].files, *described.tables)
     kept = output_path(journal, design.with_suffix(".journal"), ModelError, overwrite_of=inputs, needs_file=True)
     default = [] if json else [design.with_suffix(".csv"), design.with_suffix(".png")]
@@ -281,8 +286,7 @@ def best_system(result: "OptimizationResult") -> str:
     design = result.design
     path = Path(design.study.system)
     document: Any = tomlkit.parse(path.read_text(encoding="utf-8-sig"))
-    point = design.point(result.best.evaluation.values)
-    values = dict(zip([key for p in design.parameters for key in p.paths], point, strict=True))
+    values = design.study.changes(design.point(result.best.evaluation.values))
     parameters = read_parametric(path, SystemFileError).parameters
     try:
         for name, value in values.items():

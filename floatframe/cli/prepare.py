@@ -54,7 +54,9 @@ LATER = {"relative": "motion", "schemes": "motion"}  #: parts that start after a
 
 @guarded
 def prepare_command(
-    workers: Annotated[int, typer.Option(min=0, help="Processes at a time; 0: one per processor.")] = 0,
+    workers: Annotated[
+        int, typer.Option("--workers", "-j", min=0, help="Processes at a time; 0: one per processor.")
+    ] = 0,
 ) -> None:
     """Compile the code of motions and reductions in advance.
 

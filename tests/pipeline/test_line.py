@@ -17,6 +17,7 @@ import floatframe as ff
 from cms.cli.app import app
 from fe_models.parts import shipped_mesh
 from floatframe.results.trajectory import BodyMotion
+from tests.docs.tutorials import PAGES, blocks
 from tests.root import ROOT
 
 README = ROOT / "README.md"
@@ -98,19 +99,19 @@ def test_a_stiff_rod_swings_with_the_period_of_the_compound_pendulum(reduced):
     assert_allclose(np.abs(rod.omega_B[k, 1]), np.sqrt(2 * moments.m * GRAVITY * s / J), rtol=1e-4)
 
 
-def test_type_checkers_accept_the_python_example(tmp_path):
+def test_type_checkers_accept_the_python_of_readme_and_tutorials(tmp_path):
     """Tuples and lists where a field holds an array; a wrong kind is still seen."""
     block = re.search(r"<!-- python -->\n```python\n(.*?)```", README.read_text(), re.DOTALL)
     (tmp_path / "example.py").write_text(block[1] + "ff.Gravity(acceleration=pin)\n")
+    for page in PAGES:
+        for name, language, content in blocks(page):
+            if language == "python":
+                (tmp_path / page / name).parent.mkdir(parents=True, exist_ok=True)
+                (tmp_path / page / name).write_text(content)
+    files = [str(path) for path in tmp_path.rglob("*.py")]
+    assert len(files) > 5
     # in a process of its own, since mypy changes the recursion limit of the one that it runs in
-    command = [
-        sys.executable,
-        "-m",
-        "mypy",
-        str(tmp_path / "example.py"),
-        "--config-file",
-        str(ROOT / "pyproject.toml"),
-    ]
+    command = [sys.executable, "-m", "mypy", *files, "--config-file", str(ROOT / "pyproject.toml")]
     told = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False).stdout.splitlines()
     assert len(told) == 2, told
     assert 'Argument "acceleration" to "Gravity" has incompatible type "RevoluteJoint"' in told[0]

@@ -118,14 +118,18 @@ def test_calls_on_pages_name_commands_and_options_that_exist():
     assert not wrong, "\n".join(wrong)
 
 
+ALWAYS = {"--output": "-o", "--workers": "-j"}  #: short forms that these options have in every command
+
+
 def test_a_short_option_has_one_meaning_in_both_programs():
     meanings = defaultdict(set)
     for program in PROGRAMS.values():
         for command in commands_of(program).values():
             for parameter in command.params:
                 long = next((word for word in parameter.opts if word.startswith("--")), "")
+                if long in ALWAYS:
+                    assert ALWAYS[long] in parameter.opts, f"{command.name} {long}"
                 for word in parameter.opts:
                     if word.startswith("-") and not word.startswith("--"):
                         meanings[word].add(long)
     assert {word: long for word, long in meanings.items() if len(long) > 1} == {}
-    assert {"-o", "-j"} <= set(meanings)

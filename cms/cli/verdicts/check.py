@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ __all__ = ["AcceptRequest", "check_file", "print_records", "quality_report", "ru
 WORDS = {"pass": "passes", "warn": "passes with warnings", "fail": "fails", "info": "has nothing to judge"}
 
 
-def check_file(file: Path, job: Path | None, *, band: float | None, as_json: bool) -> int:
+def check_file(file: Path, job: Path | None, *, band: float | None, as_json: bool, changes: Mapping[str, Any]) -> int:
     """Check a modal file and print the verdicts; return exit code 1 if one is "fail", else 0."""
     from cms.assessment.quality.body_check import check_body
     from cms.assessment.quality.errors import QualityError
@@ -27,8 +27,10 @@ def check_file(file: Path, job: Path | None, *, band: float | None, as_json: boo
 
     if band is not None and job is None:
         raise QualityError("--band: says how far the full model is compared; give its job with --job")
+    if changes and job is None:
+        raise QualityError("--set: changes parameters of the job; give it with --job")
     reduced = read(file)
-    records = check_body(reduced) if job is None else check_against(reduced, job, band)
+    records = check_body(reduced) if job is None else check_against(reduced, job, band, changes)
     if as_json:
         typer.echo(json.dumps(quality_report(reduced, records), indent=2))
     else:
@@ -38,7 +40,9 @@ def check_file(file: Path, job: Path | None, *, band: float | None, as_json: boo
     return int(has_failed(records))
 
 
-def check_against(reduced: ReducedBody, path: Path, band: float | None) -> tuple[QualityRecord, ...]:
+def check_against(
+    reduced: ReducedBody, path: Path, band: float | None, changes: Mapping[str, Any]
+) -> tuple[QualityRecord, ...]:
     """Check a reduced body against the full model and the mode set of a job, with one factorisation."""
     from cms.assessment.quality.reduction_check import check_reduction, require_same_units
     from cms.assessment.quality.reference.full_reference import FullReference, usable_band
@@ -48,7 +52,7 @@ def check_against(reduced: ReducedBody, path: Path, band: float | None) -> tuple
     from cms.jobs.mode_set_of_job import job_mode_set, reduction_of, reduction_options
     from cms.modes.families.families import Families
 
-    job = read_job(path)
+    job = read_job(path, changes)
     with stages() as clock:
         uncoupled = uncoupled_body(job, clock)
         require_same_units(uncoupled, reduced)
@@ -118,6 +122,7 @@ class AcceptRequest:
     most_dofs: int
     strict: bool
     outputs: tuple[Path, ...]
+    changes: Mapping[str, Any]  #: values of parameters of the job
 
 
 def run_accept(request: AcceptRequest) -> int:
@@ -131,6 +136,8 @@ def run_accept(request: AcceptRequest) -> int:
     if request.deck is None and (request.program or request.densities):
         option = "--program" if request.program else "--density"
         raise QualityError(f"{option}: says how a deck is read; give the deck with --deck")
+    if request.changes and request.full is None:
+        raise QualityError("--set: changes parameters of the job; give it with --full")
     if request.full is not None and request.deck is not None:
         raise QualityError("--full and --deck: expected one full model, got two")
     wanted = request.outputs or (request.file.with_name(f"{request.file.stem}_acceptance.pdf"),)
@@ -140,7 +147,9 @@ def run_accept(request: AcceptRequest) -> int:
         require_suffix(target)
         if target.suffix.lower() == ".pdf":
             extra_module("reportlab", extra="pdf", purpose="write a document as PDF")
-    model = FullModel(request.full, request.deck, request.program, densities_of(request.densities))
+    model = FullModel(
+        request.full, request.deck, request.program, densities_of(request.densities), changes=request.changes
+    )
     with stages() as clock:
         found = accept(request.file, model, band=request.band, most_dofs=request.most_dofs, stages=clock)
         with clock("document"):

@@ -1,5 +1,6 @@
 """The command `cms compare`: mode sets of a job compared with its full model; table, HTML, JSON and CSV."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -44,7 +45,8 @@ class CompareRequest:
     pulse_at: str | None
     motion: Path | None
     stills: int
-    workers: str | None = None
+    workers: str | None
+    changes: Mapping[str, Any]  #: values of parameters of the job
 
 
 def run_compare(request: CompareRequest) -> None:
@@ -56,10 +58,12 @@ def run_compare(request: CompareRequest) -> None:
         If the requested comparison is impossible.
     """
     from cms.assessment.compare.mode_counts import mode_counts
+    from cms.jobs.job import read_job
     from cms.jobs.studies.comparison_of_job import compare
     from fe_models.foundation.tasks.workers import checked_workers
 
     require_job(request.job)
+    job = read_job(request.job, request.changes) if request.changes else request.job
     counts = mode_counts(request.modes)
     names = parse_sets(request.sets)
     if request.band is not None and not request.band > 0:
@@ -73,7 +77,7 @@ def run_compare(request: CompareRequest) -> None:
     try:
         with stages() as clock:
             comparison = compare(
-                request.job, names, counts, band=request.band, n_reference=request.n_reference, loads=loads,
+                job, names, counts, band=request.band, n_reference=request.n_reference, loads=loads,
                 pulse_at=request.pulse_at, motion=request.motion, cache=folder / CACHE, workers=workers, stages=clock,
                 on_report=reports.append,
             )  # fmt: skip

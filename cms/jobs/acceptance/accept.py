@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -59,6 +59,7 @@ class FullModel:
     deck: Path | str | None = None  #: path of a complete deck, which is read as by `cms job`
     program: str | None = None  #: program of a deck with suffix .inp: "calculix" or "abaqus"
     densities: Mapping[str, float] = field(default_factory=dict)  #: densities of materials for which the deck has none
+    changes: Mapping[str, Any] = field(default_factory=dict)  #: values of parameters and key paths of the job
 
     def __post_init__(self) -> None:
         if self.job is not None and self.deck is not None:
@@ -103,7 +104,7 @@ def accept(
     own = check_body(reduced)
     records = own
     if full.job is not None:
-        job = read_job(Path(full.job))
+        job = read_job(Path(full.job), full.changes)
         records, compared = against_job(job, Path(full.job), reduced, own, band, stages)
         if job.body.deck is not None:
             left_out = cards_left_out(parse_deck(job.body.deck))

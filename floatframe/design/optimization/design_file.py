@@ -2,6 +2,7 @@
 
 import csv
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -235,13 +236,15 @@ class DesignFile(Table):
         return self
 
 
-def read_design(path: str | os.PathLike[str]) -> Design:
+def read_design(path: str | os.PathLike[str], changes: Mapping[str, Any] | None = None) -> Design:
     """Read and check a design file.
 
     Parameters
     ----------
     path
         Name of the design file (TOML).
+    changes
+        Values of other parameters and key paths of the system file, in all evaluations.
 
     Raises
     ------
@@ -251,7 +254,7 @@ def read_design(path: str | os.PathLike[str]) -> Design:
     """
     path = Path(path)
     data = validated(DesignFile, read_toml(path, SystemFileError), path, SystemFileError, context=path.parent)
-    content = read_parametric(data.system, SystemFileError)
+    content = read_parametric(data.system, SystemFileError, changes)
     parameters = tuple(parameter_of(name, section, content, path) for name, section in data.parameters.items())
     objectives = []
     for name, o in data.objectives.items():
@@ -278,6 +281,7 @@ def read_design(path: str | os.PathLike[str]) -> Design:
             for key, factor in zip(p.paths, p.factors, strict=True)
         ),
         outputs=tuple(q.output for q in (*objectives, *constraints)),
+        given=changes or {},
     )
     return Design(
         str(path), study, data.method, data.workers, data.iterations, data.tolerance, data.combine, data.differences,

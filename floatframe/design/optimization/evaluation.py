@@ -248,7 +248,8 @@ def open_journal(path: Path, design: Design, files: tuple[str, ...]) -> TaskJour
         (q.analysis, q.output.of, q.output.take, q.band, q.at, None if q.times is None else q.times.tolist())
         for q in design.quantities
     ]
-    digest = campaign_digest(([(p.paths, p.factors) for p in design.parameters], asked), files)
+    given = [sorted(design.study.given.items())] if design.study.given else []
+    digest = campaign_digest(([(p.paths, p.factors) for p in design.parameters], asked, *given), files)
     return open_task_journal(path, KIND, digest, design.source, ResultsError)
 
 

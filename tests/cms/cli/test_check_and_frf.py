@@ -81,7 +81,9 @@ def test_the_json_of_a_check_is_its_records(folder):
 
 
 def test_with_its_job_a_file_is_compared_with_the_full_model(folder):
-    result = run("check", folder / "bar.h5", "--job", folder / "bar.toml", "--json", "--band", "10000")
+    """The job of the poor file with the number of modes of the good one is the job of the good one."""
+    job = folder / "poor.toml", "--set", "reduction.n_modes=12"
+    result = run("check", folder / "bar.h5", "--job", *job, "--json", "--band", "10000")
     told = {record["name"]: record for record in json.loads(result.stdout)["records"]}
     assert result.exit_code == 0, told
     assert told["frequency-error"]["data"]["band_hz"] == 10000
@@ -103,6 +105,15 @@ def test_the_file_of_another_job_fails(folder):
         (["check", "nothing.h5"], ["nothing.h5"]),
         (["check", "bar.toml"], ["bar.toml"]),
         (["check", "bar.h5", "--band", "1000"], ["--band", "--job"]),
+        (["check", "bar.h5", "--set", "n=1"], ["--set", "--job"]),
+        (["check", "bar.h5", "--job", "bar.toml", "--set", "n=1"], ["there is no parameter 'n'"]),
+        (["accept", "bar.h5", "--set", "n=1"], ["--set", "--full"]),
+        (["accept", "bar.h5", "--full", "bar.toml", "-o", "a.json", "--set", "n=1"], ["there is no parameter 'n'"]),
+        (["compare", "bar.toml", "--set", "n=1"], ["there is no parameter 'n'"]),
+        (["modes", "bar.toml", "--set", "n=1"], ["there is no parameter 'n'"]),
+        (["converge", "bar.toml", "--set", "n=1"], ["there is no parameter 'n'"]),
+        (["frf", "bar.h5", *FRF, "--set", "n=1"], ["--set", "--job"]),
+        (["frf", "bar.h5", *FRF, "--job", "bar.toml", "--set", "n=1"], ["there is no parameter 'n'"]),
         (["check", "bar.h5", "--job", "nothing.toml"], ["nothing.toml"]),
         (["check", "bar.h5", "--job", "bar.toml", "--band", "-5"], ["expected a frequency above 0"]),
         (["check", "bar.h5", "--job", "metres.toml"], ["mm-kg-ms", "mm-t-s"]),

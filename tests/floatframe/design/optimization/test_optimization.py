@@ -328,6 +328,10 @@ def test_the_command_works_in_processes_and_writes_table_picture_and_journal(fol
     assert record["computed"] == 0
     assert len(record["history"]) == len(rows)
     assert record["converged"]
+    heavy = folder / "longer.toml", "-j", 1, "--json", "--set", "bodies.rod.mass=4.0"
+    assert "journal is of another system" in command(*heavy, code=2)
+    record = json.loads(command(*heavy, "--journal", folder / "heavy.journal"))
+    assert_allclose(record["best"]["parameters"]["d"], np.sqrt(INERTIA / 4.0), rtol=0, atol=1e-4)
 
 
 @pytest.mark.parametrize(("old", "new", "words"), [
