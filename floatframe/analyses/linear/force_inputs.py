@@ -83,7 +83,8 @@ def force_column(small: SmallMotions, channel: ForceInput) -> tuple[Array, Array
     for value in (now, now + 1.0):
         changed = replace(force, **{key: constant(value)})
         forces = [changed if each is force else each for each in small.system.forces]
-        model = compiled_system(replace(small.system, forces=forces, inputs=(), outputs=())).model
+        system = replace(small.system, forces=forces, inputs=(), outputs=())  # holds the functions that the model calls
+        model = compiled_system(system).model
         work = new_work(model)
         set_iterate(work, small.state, w=small.work.state.w)
         linearized(model, work, 0.0, 0.0, 1.0)

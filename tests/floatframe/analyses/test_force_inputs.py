@@ -1,5 +1,6 @@
 """Amplitudes of forces and motors as inputs: slopes of motions and equilibria with a little more of them."""
 
+import gc
 from dataclasses import replace
 
 import numpy as np
@@ -9,8 +10,21 @@ from numpy.testing import assert_allclose
 import cms
 from fe_models.body.load_cases import ReducedLoadCase
 from fe_models.body.loads import gravity_load
-from floatframe import JointForce, Marker, PointForce, linearize, static_equilibrium
+from floatframe import (
+    GROUND,
+    JointForce,
+    Marker,
+    PointForce,
+    RevoluteJoint,
+    RigidBody,
+    System,
+    UserForce,
+    linearize,
+    static_equilibrium,
+)
 from floatframe.analyses import ForceInput, consistent_state
+from floatframe.analyses.linear import force_inputs
+from floatframe.engine.compiling.callbacks.user_forces import C_FUNCTION
 from floatframe.errors import ModelError
 from floatframe.forces import BodyLoad
 from floatframe.model.functions.time_functions import constant, harmonic
@@ -113,3 +127,27 @@ def test_a_force_without_an_amplitude_has_one_of_one(rest):
     about = static_equilibrium(system)
     columns = [linearize(each, about, inputs=[ForceInput("p", "push")]).B for each in (system, same)]
     assert_allclose(columns[0], columns[1], rtol=1e-12)
+
+
+def test_a_python_force_beside_an_input_is_kept_while_it_is_called(monkeypatch):
+    """Addresses that were freed would be given to the functions made here, which spoil the outputs of the force."""
+
+    def spring(t, x, v, z, Q, z_dot):
+        Q[0] = -3.0 * x[0]
+
+    def spoil(inputs, outputs):
+        outputs[0] = np.nan
+
+    def spoilt(*given):
+        gc.collect()
+        others.extend(C_FUNCTION(spoil) for _ in range(64))
+        return plain(*given)
+
+    plain, others = force_inputs.linearized, []
+    rod = RigidBody("rod", 2.0, np.diag([0.1, 0.2, 0.2]))
+    pin = RevoluteJoint("pin", Marker(GROUND), Marker("rod"), axis=(0, 1, 0))
+    held = UserForce("spring", {"phi": "pin.angle"}, forces=["phi"], function=spring)
+    system = System(rod, pin, [held, JointForce("motor", "pin", "angle", motor=0.0)])
+    monkeypatch.setattr(force_inputs, "linearized", spoilt)
+    linear = linearize(system, inputs=["motor.torque"], outputs=["pin.angle"])
+    assert_allclose(linear.L @ np.linalg.solve(linear.K, linear.B), [[1 / 3.0]], rtol=1e-6)
