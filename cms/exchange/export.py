@@ -131,7 +131,7 @@ class Exported:
     units: Units  #: units of the numbers in the files
 
 
-#: formats that are not documented, by their names and those of their programs (docs/formats.md)
+#: formats that are not documented, by their names and those of their programs (docs/adams_simpack.md)
 UNDOCUMENTED = {"mnf": "Adams", "adams": "Adams", "fbi": "Simpack", "simpack": "Simpack"}
 
 
@@ -143,7 +143,7 @@ def unknown_format(name: str) -> str:
     near = "nastran-dmig" if program == "Adams" else "sid_fem"
     return (
         f"{quoted(name)}: the file format of {program} is not documented, so it cannot be written; "
-        f'{near} may be an alternative, see "Adams and Simpack" in docs/formats.md'
+        f"{near} may be an alternative, see docs/adams_simpack.md"
     )
 
 

@@ -1,4 +1,4 @@
-"""Reference pages, made from the programs: all commands with their options, all keys of every kind of file."""
+"""Reference pages, made from the programs: commands with their options, keys of every kind of file, fields of decks."""
 
 import json
 import re
@@ -12,6 +12,7 @@ from sphinx.application import Sphinx
 
 import cms.cli.app
 import floatframe.cli.app
+from fe_models.files.field_pages import field_tables
 from fe_models.foundation.file_kinds import KINDS
 from fe_models.foundation.parametric_file import schema_text
 
@@ -19,11 +20,12 @@ PROGRAMS = {"cms": cms.cli.app.app, "floatframe": floatframe.cli.app.app}
 
 
 def write_pages(app: Sphinx) -> None:
-    """Write reference/NAME-commands.md and reference/NAME-file.md into the source folder; remove old pages."""
+    """Write the pages into the folder reference of the sources; remove old pages."""
     folder = Path(app.srcdir) / "reference"
     folder.mkdir(exist_ok=True)
     pages = {f"{name}-commands.md": commands_page(name) for name in PROGRAMS}
     pages |= {f"{kind}-file.md": keys_page(kind) for kind in KINDS}
+    pages["deck-fields.md"] = fields_page()
     for old in folder.glob("*.md"):
         if old.name not in pages:
             old.unlink()
@@ -101,6 +103,22 @@ def keys_table(definition: dict[str, Any]) -> list[str]:
         meaning = next((each["description"] for each in found if "description" in each), "")
         rows.append((f"`{key}`", literal(meaning), f"`{defaults[0]}`" if defaults and len(defaults[0]) < 60 else ""))
     return table(("key", "meaning", "default"), rows)
+
+
+# decks ---------------------------------------------------------------------------------------------------------
+
+
+def fields_page() -> str:
+    """Return the page of all cards, keywords and commands of decks, with their fields."""
+    lines = [
+        "# Fields of decks",
+        "",
+        "These tables drive the readers. What the body has of them is on [decks](../deck_fields.md).",
+        "",
+        field_tables(),
+        "",
+    ]
+    return "\n".join(lines)
 
 
 # text ------------------------------------------------------------------------------------------------------------

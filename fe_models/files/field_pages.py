@@ -1,4 +1,4 @@
-"""Tables of the fields of all programs in Markdown, for the page docs/deck_fields.md."""
+"""Tables of the fields of all programs in Markdown, for the reference pages of the documentation."""
 
 from fe_models.files.abaqus.keywords import PARAMETERS, parameters_of
 from fe_models.files.ansys.command_fields import COLUMNS, COMMANDS, fields_of_command

@@ -12,6 +12,9 @@ from types import SimpleNamespace
 import pytest
 
 from fe_models.door import namespaces
+from fe_models.files.abaqus.keywords import PARAMETERS
+from fe_models.files.ansys.command_fields import COMMANDS
+from fe_models.files.nastran.deck.card_fields import CARDS
 from fe_models.foundation.file_kinds import KINDS
 from fe_models.foundation.parametric_file import schema_text
 from tests.root import ROOT
@@ -64,7 +67,7 @@ def test_reference_pages_hold_every_command_option_and_key(tmp_path):
     (tmp_path / "reference" / "gone-file.md").write_text("old")
     reference_pages.write_pages(SimpleNamespace(srcdir=tmp_path))
     pages = {path.stem: path.read_text(encoding="utf-8") for path in (tmp_path / "reference").glob("*.md")}
-    assert set(pages) == {"cms-commands", "floatframe-commands", *(f"{kind}-file" for kind in KINDS)}
+    assert set(pages) == {"cms-commands", "floatframe-commands", "deck-fields", *(f"{kind}-file" for kind in KINDS)}
     reduce = pages["cms-commands"].split("### cms reduce\n")[1].split("###")[0]
     assert re.search(
         r"^\| `--workers`, `-j` \| Where tasks are computed: .* \[cluster\]\(\.\./cluster\.md\)", reduce, re.MULTILINE
@@ -72,6 +75,12 @@ def test_reference_pages_hold_every_command_option_and_key(tmp_path):
     assert "```sh\ncms reduce rod.toml -o rod.h5\n" in reduce
     beams = pages["job-file"].split("## \\[sections.NAME\\]\n")[1].split("##")[0]
     assert re.search(r"^\| `shear` \| true or false: .* \| `true` \|$", beams, re.MULTILINE)
+
+
+def test_the_page_of_deck_fields_has_every_card_that_is_read():
+    page = reference_pages.fields_page()
+    cards = {*CARDS, *(f"*{name}" for name in PARAMETERS), *COMMANDS}
+    assert sorted(card for card in cards if f"| `{card}` |" not in page) == []
 
 
 def test_every_key_of_every_kind_of_file_has_a_meaning_on_its_page():

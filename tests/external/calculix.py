@@ -1,6 +1,6 @@
 """CalculiX and its own test decks, as they are installed: the decks of linear bodies, and their frequencies by ccx.
 
-`python -m tests.external.calculix` gives the figures of docs/formats.md: decks read, refused, and the difference of
+`python -m tests.external.calculix` gives the figures of docs/measured.md: decks read, refused, and the difference of
 their frequencies. Every deck is given to ccx as the model it describes: its steps are cut off, what they hold is held,
 a material without density gets 1, and one frequency step is added.
 """
@@ -26,7 +26,7 @@ from fe_models.foundation.stages import Stages
 
 FOLDER = Path("/usr/share/doc/calculix-ccx-test/examples/test")
 LIST = Path(__file__).parent / "data" / "calculix_linear_decks.txt"
-#: what a deck of the list does not have, and the elements it has (docs/formats.md)
+#: what a deck of the list does not have, and the elements it has (docs/measured.md)
 FOREIGN = {
     "PLASTIC", "CREEP", "HYPERELASTIC", "HYPERFOAM", "USER MATERIAL", "CYCLIC HARDENING", "DEFORMATION PLASTICITY",
     "CONTACT PAIR", "GAP", "FLUID SECTION", "MODEL CHANGE", "CHANGE MATERIAL", "CHANGE SOLID SECTION",

@@ -1,4 +1,4 @@
-"""How many decks of a folder make a body: `python -m tests.external.nastran FOLDER` gives the count of docs/formats.md.
+"""Decks of a folder that make a body: `python -m tests.external.nastran FOLDER` gives the count of docs/measured.md.
 
 A deck makes a body if `cms job` writes its job and the coupled body is assembled. Materials without density get
 7800 kg/m³ where nothing else has mass, and odd units are accepted. Every other deck is printed with the reason.
