@@ -1,4 +1,4 @@
-"""Estimated errors of free frequencies against the true ones, for every mode set; and what the estimates cost.
+"""Estimated errors of frequencies and frequency responses against true ones, for all mode sets; and their cost.
 
 python -m benchmarks.error_estimates                  # 60 bodies, all mode sets: some minutes
 python -m benchmarks.error_estimates --cost 12        # a bar of 48 x 12 x 12 bricks of tet10, 50 modes
@@ -19,13 +19,15 @@ from cms.errors import CmsError
 from cms.modes.families.families import Families
 from cms.modes.mode_sets import MODE_SETS
 from cms.reduction.basis.free_basis import free_basis
-from cms.reduction.error_estimates import error_estimates
+from cms.reduction.error_estimates import EnlargedSpace, error_estimates, response_errors, response_loads
 from cms.reduction.reduction import reduce
 from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.errors import FeModelsError
 from tests.bodies import bar
 from tests.campaign.random_bodies import random_body
 
+LEAST_RESPONSE = 1e-6  #: true error of a response, below which it is rounding
+NO_MASS = 1e-9  #: mu of a shape divided by that of the first, below which it has no mass
 LEAST, MOST = 1e-8, 0.5  #: true errors of frequency that are counted: below is rounding, above is no approximation
 SETS = [name for name in MODE_SETS if name != "user-basis"]
 
@@ -54,50 +56,65 @@ def set_of(name: str, families: Families, rng: np.random.Generator) -> Any:
         return None
 
 
-def exact_frequencies(families: Families) -> np.ndarray:
-    """Return all elastic free frequencies by LAPACK: mu = 1 / (omega² + s) of M x = mu (K + s M) x."""
+def exact_modes(families: Families) -> tuple[np.ndarray, np.ndarray]:
+    """Return 1 / omega² and the elastic free modes of unit strain energy by LAPACK: M x = mu (K + s M) x."""
     body, n_rigid = families.body, families.free.N.shape[1]
     K, M = body.K.toarray(), body.M.toarray()
     s = float(families.free_modes(n_modes=1).omega2[0])
     size = 1 / np.sqrt(np.diag(K + s * M))
-    mu = la.eigh(M * np.outer(size, size), (K + s * M) * np.outer(size, size), eigvals_only=True)[::-1][n_rigid:]
-    return np.sqrt(1 / mu[mu > 1e-9 / s] - s) / (2 * np.pi)
+    mu, X = la.eigh(M * np.outer(size, size), (K + s * M) * np.outer(size, size))
+    mu, X = np.maximum(mu[::-1][n_rigid:], 0.0), size[:, None] * X[:, ::-1][:, n_rigid:]
+    return mu / (1 - s * mu), X / np.sqrt(1 - s * mu)
 
 
-def judged(n: int) -> tuple[int, dict[str, np.ndarray]]:
-    """Return the number of bodies, and true and estimated errors of frequencies below the cutoff, for each set."""
+def judged(n: int) -> tuple[int, dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Return the number of bodies, and true and estimated errors of frequencies and responses of each set."""
     found: dict[str, list[tuple[float, float]]] = {name: [] for name in SETS}
+    responses: dict[str, list[tuple[float, float]]] = {name: [] for name in SETS}
     n_bodies = 0
     for seed, body in bodies(n):
         rng = np.random.default_rng(seed)
         with Families(body, announce=False) as families:
-            exact = exact_frequencies(families)
+            mu, X = exact_modes(families)
+            exact = 1 / (2 * np.pi * np.sqrt(mu[mu > NO_MASS * mu[0]]))
+            loads = response_loads(body)
             n_bodies += 1
             for name in SETS:
                 if (modes := set_of(name, families, rng)) is None:
                     continue
                 try:
                     basis = free_basis(body, modes, families)
-                    errors = error_estimates(families, modes, basis).frequency
+                    errors = error_estimates(families, modes, basis)
                 except CmsError:
                     continue
-                k = min(len(errors), len(exact))
-                found[name] += zip(basis.frequencies()[:k] / exact[:k] - 1, errors[:k], strict=True)
-    return n_bodies, {name: np.array(pairs).reshape(-1, 2) for name, pairs in found.items()}
+                k = min(len(errors.frequency), len(exact))
+                found[name] += zip(basis.frequencies()[:k] / exact[:k] - 1, errors.frequency[:k], strict=True)
+                whole = EnlargedSpace(errors.bound, mu, np.zeros((0, 0)), loads.T @ X)
+                responses[name] += zip(response_errors(basis, whole, loads), errors.response, strict=True)
+    return n_bodies, *(
+        {name: np.array(pairs).reshape(-1, 2) for name, pairs in each.items()} for each in (found, responses)
+    )
 
 
 def print_judged(n: int) -> None:
     """Print for each set how many estimates are within a factor of two of the true error."""
-    n_bodies, found = judged(n)
+    n_bodies, frequencies, responses = judged(n)
     print(f"{n_bodies} bodies; true errors from {LEAST:g} to {MOST:g}")
+    print_ratios("errors of frequencies", frequencies, LEAST)
+    print_ratios("errors of frequency responses between the interfaces", responses, LEAST_RESPONSE)
+
+
+def print_ratios(title: str, found: dict[str, np.ndarray], rounding: float) -> None:
+    """Print how many estimates of each set are within a factor of two of true errors above rounding."""
+    print(f"\n{title}")
     print(f"{'set':26s}{'modes':>7s}{'counted':>9s}{'in [0.5, 2]':>13s}{'least':>8s}{'most':>7s}{'exact':>7s}")
     for name, pairs in [*found.items(), ("all", np.concatenate(list(found.values())))]:
         true, estimate = pairs.T
-        is_counted = (true > LEAST) & (true < MOST)
+        is_counted = (true > rounding) & (true < MOST)
         ratio = estimate[is_counted] / true[is_counted]
         within = f"{100 * np.mean((ratio >= 0.5) & (ratio <= 2)):.1f} %" if len(ratio) else ""
         span = (f"{ratio.min():.2f}", f"{ratio.max():.2f}") if len(ratio) else ("", "")
-        n_exact = int((true <= LEAST).sum())
+        n_exact = int((true <= rounding).sum())
         print(f"{name:26s}{len(true):7d}{len(ratio):9d}{within:>13s}{span[0]:>8s}{span[1]:>7s}{n_exact:7d}")
 
 

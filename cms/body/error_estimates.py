@@ -27,6 +27,10 @@ class ErrorEstimates:
         Rigorous bound b, (n_judged,): some exact frequency f satisfies |(f_reduced / f)² - 1| <= b.
     shape
         Estimate of the error of each shape in the norm of strain energy, relative to the shape, (n_judged,).
+    response
+        Estimate of the error of the receptance between the interfaces around each frequency, relative to the
+        receptance, (n_judged,): root mean square over the frequencies halfway to those beside it, Frobenius norm with
+        rotations times the length of the body, 1 % damping in every mode. Empty: the body has no interface.
     interface_loads
         Names of the unit loads at interfaces, or of random sums of them if they are very many, (n_loads,).
     interface
@@ -44,6 +48,7 @@ class ErrorEstimates:
     frequency: Annotated[Array, ArrayShape(("n_judged",))]
     bound: Annotated[Array, ArrayShape(("n_judged",))]
     shape: Annotated[Array, ArrayShape(("n_judged",))]
+    response: Annotated[Array, ArrayShape(("n_responses",))] = field(default_factory=lambda: np.zeros(0))
     interface_loads: Annotated[tuple[str, ...], ArrayShape(("n_loads",))] = ()
     interface: Annotated[Array, ArrayShape(("n_loads",), has_nan=True)] = field(default_factory=lambda: np.zeros(0))
     inertia: Annotated[Array, ArrayShape((None,), has_nan=True)] = field(default_factory=lambda: np.zeros(0))

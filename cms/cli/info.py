@@ -136,15 +136,21 @@ def print_free_frequencies(record: Any) -> None:
     n = len(errors["frequency"])
     print_table(
         f"{title}, and their estimated errors by the reduction",
-        ("mode>", "Hz>", "error>", "at most>", "shape>"),
+        ("mode>", "Hz>", "error>", "at most>", "shape>", *(["response>"] if errors["response"] else [])),
         [
-            (str(k + 1), frequencies[k], *(error_percent(errors[key][k]) for key in ("frequency", "distance", "shape")))
+            (
+                str(k + 1),
+                frequencies[k],
+                *(error_percent(errors[key][k]) for key in ("frequency", "distance", "shape")),
+                *map(error_percent, errors["response"][k : k + 1]),
+            )
             for k in range(n)
         ],
     )
     say(
         "error: an estimate, and the true error is not smaller; at most: some exact frequency is so near; shape: in "
-        "the norm of strain energy"
+        "the norm of strain energy; response: estimate for the receptance between the interfaces around this "
+        "frequency, with 1 % damping"
     )
     if len(frequencies) > n:
         say(f"not judged [Hz]: {', '.join(frequencies[n:])}")

@@ -16,6 +16,11 @@ is K-orthogonal to V, because phi is a Galerkin solution.
     The error of a shape is its distance from the span of the new shapes whose frequencies are within 0.1 % of lambda'.
 (3) A mode that every phi lacks leaves no trace in e. A few random columns, M-orthogonal to V and smoothed by two steps
     of inverse iteration, are added to the span, so that such a mode appears among the lambda'.
+(4) Responses. Let y solve Vᵀ (K - omega² M) V y = Vᵀ b. One step of inverse iteration with its residual,
+    G [b - (K - omega² M) V y], has beside V the part of G b that is K-orthogonal to V, plus
+    sum_j omega² / theta_j y_j e_j. The e_j of judged modes are in the span already. Above them y_j is nearly
+    phi_jᵀ b / theta_j, because omega² is less than theta_j, and one column for each load has the sum of
+    phi_jᵀ b / theta_j² e_j. The responses in the enlarged span and in V are compared.
 
 References
 ----------
@@ -51,9 +56,13 @@ CLUSTERED = 8  #: number of shapes beyond the judged ones that may belong to the
 NO_ENERGY = 1e-24  #: strain energy of a response relative to the largest of its kind, below which it is zero
 STATIC_ROUNDING = 1e-5  #: error of a static response, below which it is rounding
 MOST_LOADS, SUMS = 120, 12  #: largest number of unit loads that are judged one by one, else number of sums
+RESPONSE_ROUNDING = 1e-7  #: error of a frequency response, below which it is rounding
+DAMPING = 0.01  #: damping ratio of every mode in frequency responses
+LOWEST = 0.05  #: lowest frequency of a response divided by the first elastic one; below it the body moves rigidly
+POINTS = 33  #: number of frequencies around each mode at which responses are compared
 METHOD = (
-    "frequency, shape: lower estimates, Rayleigh-Ritz with one step of inverse iteration; bound: rigorous, from the "
-    "residual; static responses: computed, not estimated"
+    "frequency, shape, response: estimates by the Rayleigh-Ritz method with one step of inverse iteration; bound: "
+    "rigorous, from the residual; static responses: computed, not estimated"
 )
 
 
@@ -64,6 +73,16 @@ class FrequencyErrors:
     frequency: Array  #: estimate of f_reduced / f - 1, (n,)
     bound: Array  #: rigorous bound b, (n,)
     shape: Array  #: estimate of the error of the shape in the norm of strain energy, (n,)
+
+
+@dataclass(frozen=True, eq=False)
+class EnlargedSpace:
+    """The span of a mode set, its corrections and some random columns, with shapes from the Rayleigh-Ritz method."""
+
+    bound: Array  #: b of the judged modes, (n,)
+    mu: Array  #: 1 / omega² of the new shapes, descending, (n_W,)
+    Y: Array  #: part of each shape of V, scaled to unit strain energy, in each new shape, (n_V, n_W)
+    motion: Array  #: motion in the directions of the loads in the new shapes of unit strain energy, (n_loads, n_W)
 
 
 def require_one_process(body: FEBody) -> None:
@@ -81,7 +100,7 @@ def error_estimates(families: Families, modes: ModeSet, basis: FreeBasis) -> Err
     Parameters
     ----------
     families
-        Families of the body, open: their factorisation is used for as many solutions as modes are judged.
+        Families of the body, open: their factorisation is used for as many solutions as modes and loads are judged.
     modes
         The mode set.
     basis
@@ -91,15 +110,21 @@ def error_estimates(families: Families, modes: ModeSet, basis: FreeBasis) -> Err
     vibrating = modes.frequencies[~modes.is_static]
     n = int((frequencies <= (1 + EXACT) * vibrating.max()).sum()) if len(vibrating) else min(JUDGED, len(frequencies))
     n = min(max(n, 1), len(frequencies))
-    errors = frequency_errors(families, basis, n)
     loads, interface = interface_errors(families, basis)
+    interface = four_digits(interface, STATIC_ROUNDING)
+    inertia = four_digits(energy_error(families.body, basis, families.Psi_H), STATIC_ROUNDING)
+    directions = response_loads(families.body)
+    has_statics = not (np.nan_to_num(interface).any() or np.nan_to_num(inertia).any())
+    space = enlarged_space(families, basis, n, directions, has_statics=has_statics)
+    errors = errors_of_modes(basis, space)
     return ErrorEstimates(
         four_digits(errors.frequency, FREQUENCY_ROUNDING),
         four_digits(errors.bound),
         four_digits(errors.shape),
+        four_digits(response_errors(basis, space, directions), RESPONSE_ROUNDING),
         loads,
-        four_digits(interface, STATIC_ROUNDING),
-        four_digits(energy_error(families.body, basis, families.Psi_H), STATIC_ROUNDING),
+        interface,
+        inertia,
         METHOD,
         datetime.now(UTC).date().isoformat(),
     )
@@ -107,18 +132,46 @@ def error_estimates(families: Families, modes: ModeSet, basis: FreeBasis) -> Err
 
 def frequency_errors(families: Families, basis: FreeBasis, n: int) -> FrequencyErrors:
     """Estimate the errors of the lowest n free frequencies and shapes: n + 12 solutions with the factorisation."""
+    return errors_of_modes(basis, enlarged_space(families, basis, n, np.zeros((families.body.n_dof, 0))))
+
+
+def enlarged_space(
+    families: Families, basis: FreeBasis, n: int, directions: Array, *, has_statics: bool = False
+) -> EnlargedSpace:
+    """Add the corrections of the lowest n modes and of the responses to loads, and random columns, to the set.
+
+    Parameters
+    ----------
+    directions
+        Load columns, (n_dof, n_loads).
+    has_statics
+        Whether the set contains the static responses to these loads.
+    """
     products, V, omega2 = Products.of_body(families.body), basis.Phi, basis.omega2
     theta = omega2[:n]
-    E = theta * families.flexibility(products.M @ V[:, :n]) - V[:, :n]
+    loads, above = [theta * (products.M @ V[:, :n])], V[:, n:][:, basis.is_massive[n:]]
+    share = inner(above, directions) / omega2[n : n + above.shape[1], None]
+    if directions.shape[1] and not has_statics:
+        loads.append(directions)
+    if directions.shape[1] and above.shape[1]:
+        loads.append(products.M @ combine(above, share))
+    U = families.flexibility(np.hstack(loads))  # (4): the part in V is taken out below
+    E = U[:, :n] - V[:, :n]
     K_E = products.K @ E
     bound = np.sqrt(np.maximum(dots(E, K_E), 0.0) / theta)  # (1)
     subtract(E, V, inner(V, K_E) / omega2[:, None])  # rounding
-    X = np.hstack([E[:, bound > EXACT], *random_columns(families, basis, products)])
-    mu, Y = enlarged_shapes(basis, X, products, n + CLUSTERED)  # (2)
-    frequency = np.sqrt(np.maximum(theta * mu[:n], 1.0)) - 1
+    X = [E[:, bound > EXACT], independent_part(basis, products, U[:, n:])]
+    return ritz_shapes(basis, np.hstack([*X, *random_columns(families, basis, products)]), products, bound, directions)
+
+
+def errors_of_modes(basis: FreeBasis, space: EnlargedSpace) -> FrequencyErrors:
+    """Compare the judged modes with the shapes of the enlarged space."""
+    n = len(space.bound)
+    mu, Y = space.mu[: n + CLUSTERED], space.Y[:, : n + CLUSTERED]
+    frequency = np.sqrt(np.maximum(basis.omega2[:n] * mu[:n], 1.0)) - 1
     own = np.sqrt(mu[:n, None])
     inside = np.where(np.abs(np.sqrt(mu) - own) < CLUSTER * own, Y[:n] ** 2, 0.0).sum(axis=1)
-    return FrequencyErrors(frequency, bound, np.sqrt(np.maximum(1 - inside, 0.0)))
+    return FrequencyErrors(frequency, space.bound, np.sqrt(np.maximum(1 - inside, 0.0)))
 
 
 def random_columns(families: Families, basis: FreeBasis, products: Products) -> Iterator[Array]:
@@ -126,40 +179,105 @@ def random_columns(families: Families, basis: FreeBasis, products: Products) -> 
 
     Each step begins M-orthogonal to the span. Columns that lie in the span are left out.
     """
-    V, massive = basis.Phi, basis.vibrating
+    massive = basis.vibrating
     F = products.M @ np.random.default_rng(SEED).standard_normal((families.body.n_dof, RANDOM))
     for _ in range(STEPS):
         X = families.flexibility(F)
         F = products.M @ (X - combine(massive, inner(massive, products.M @ X)))
-        before = dots(X, products.K @ X)
-        for _ in range(2):
-            K_X = products.K @ X
-            subtract(X, V, inner(V, K_X) / basis.omega2[:, None])
-        yield X[:, dots(X, K_X) > EXACT**2 * before]
+        yield independent_part(basis, products, X)
 
 
-def enlarged_shapes(basis: FreeBasis, X: Array, products: Products, n: int) -> tuple[Array, Array]:
-    """Return 1 / omega² of the lowest n shapes in the span of V and X, where VᵀKX = 0, by the Rayleigh-Ritz method.
+def independent_part(basis: FreeBasis, products: Products, X: Array) -> Array:
+    """Return columns that are K-orthogonal to the span of the set; those that lie in the span are left out."""
+    before = dots(X, products.K @ X)
+    for _ in range(2):
+        K_X = products.K @ X
+        subtract(X, basis.Phi, inner(basis.Phi, K_X) / basis.omega2[:, None])
+    return X[:, dots(X, K_X) > EXACT**2 * before]
 
-    Returns
-    -------
-    mu
-        1 / omega², descending, (n,); fewer if the span is smaller.
-    Y
-        Part of each shape of V, scaled to unit strain energy, in each of these shapes, (n_V, n).
-    """
-    omega2 = basis.omega2
+
+def ritz_shapes(basis: FreeBasis, X: Array, products: Products, bound: Array, directions: Array) -> EnlargedSpace:
+    """Apply the Rayleigh-Ritz method to the span of V and X, where VᵀKX = 0."""
+    omega = np.sqrt(basis.omega2)
     K_X = products.K @ X
     size = 1 / np.sqrt(np.maximum(dots(X, K_X), np.finfo(float).tiny))
     energies, T = la.eigh(gram(X, K_X) * np.outer(size, size))
     is_independent = energies > INDEPENDENT
     T = size[:, None] * T[:, is_independent] / np.sqrt(energies[is_independent])
     M_X = products.M @ X
-    inverse = np.where(basis.is_massive, 1 / omega2, 0.0)
-    beside = (inner(basis.Phi, M_X) / np.sqrt(omega2)[:, None]) @ T
-    mass = np.block([[np.diag(inverse), beside], [beside.T, T.T @ gram(X, M_X) @ T]])
-    mu, Y = la.eigh(mass, subset_by_index=[max(0, len(mass) - n), len(mass) - 1])
-    return np.maximum(mu[::-1], 0.0), Y[: len(omega2), ::-1]
+    beside = (inner(basis.Phi, M_X) / omega[:, None]) @ T
+    mass = np.block([[np.diag(static_factors(basis)), beside], [beside.T, T.T @ gram(X, M_X) @ T]])
+    mu, Y = la.eigh(mass)
+    mu, Y = np.maximum(mu[::-1], 0.0), Y[:, ::-1]
+    motion = np.hstack([inner(directions, basis.Phi) / omega, inner(directions, X) @ T]) @ Y
+    return EnlargedSpace(bound, mu, Y[: len(omega)], motion)
+
+
+def static_factors(basis: FreeBasis) -> Array:
+    """Return mu of the shapes of the set: 1 / omega², 0 of massless ones, (n,)."""
+    return np.where(basis.is_massive, 1 / basis.omega2, 0.0)
+
+
+# frequency responses between interfaces ---------------------------------------------------------------------------
+
+
+def response_loads(body: FEBody) -> Array:
+    """Return unit loads at the interfaces as columns, moments times the length; if they are many, random sums of them.
+
+    Returns
+    -------
+    ndarray
+        (n_dof, n_loads).
+    """
+    size = np.where(body.dofs[body.b, 1] < 3, 1.0, body.length)
+    sums = np.eye(len(size))
+    if len(size) > SUMS:
+        sums = np.random.default_rng(SEED).choice([-1.0, 1.0], (len(size), SUMS))
+    loads = np.zeros((body.n_dof, sums.shape[1]))
+    loads[body.b] = size[:, None] * sums
+    return loads
+
+
+def response_errors(basis: FreeBasis, space: EnlargedSpace, directions: Array) -> Array:
+    """Return the error of the receptance between the loads around each judged mode, (n,); empty without loads."""
+    omega = np.sqrt(basis.omega2[: len(space.bound) if directions.shape[1] else 0])
+    if not len(omega):
+        return np.zeros(0)
+    middle = (omega[1:] + omega[:-1]) / 2
+    lowest, highest = np.append(LOWEST * omega[0], middle), np.append(middle, omega[-1])
+    motion = inner(directions, basis.Phi) / np.sqrt(basis.omega2)
+    rigid = inner(directions, basis.N)
+    return np.array(
+        [
+            receptance_error(
+                np.linspace(low, high, POINTS), (motion, static_factors(basis)), (space.motion, space.mu), rigid
+            )
+            for low, high in zip(lowest, highest, strict=True)
+        ]
+    )
+
+
+def receptance_error(omega: Array, reduced: tuple[Array, Array], better: tuple[Array, Array], rigid: Array) -> float:
+    """Return the root mean square of |H_reduced - H| / |H| over frequencies, Frobenius norms.
+
+    H = -R Rᵀ / omega² + sum_k p_k p_kᵀ / (1 - mu_k omega² + 2 i zeta omega sqrt(mu_k)), p_k of unit strain energy.
+
+    Parameters
+    ----------
+    omega
+        Angular frequencies, (n_f,).
+    reduced, better
+        Motion p in the directions of the loads, (n_loads, n), and mu, (n,), of two models.
+    rigid
+        Motion R of the M-orthonormal rigid-body motions, (n_loads, n_r).
+    """
+    elastic = []
+    for p, mu in (reduced, better):
+        gain = 1 / (1 - np.outer(omega**2, mu) + 2j * DAMPING * np.outer(omega, np.sqrt(mu)))
+        elastic.append((p * gain[:, None, :]) @ p.T)
+    size = np.linalg.norm(elastic[1] - (rigid @ rigid.T) / omega[:, None, None] ** 2, axis=(1, 2))
+    error = np.linalg.norm(elastic[0] - elastic[1], axis=(1, 2))
+    return float(np.sqrt(np.mean((error / np.where(size > 0, size, 1.0)) ** 2)))
 
 
 def four_digits(errors: Array, rounding: float = 0.0) -> Array:

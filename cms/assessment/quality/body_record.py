@@ -118,6 +118,7 @@ def errors_record(errors: ErrorEstimates) -> dict[str, Any]:
         "bound": errors.bound.tolist(),
         "distance": [_finite(x) for x in errors.distance],
         "shape": errors.shape.tolist(),
+        "response": errors.response.tolist(),
         "interface_loads": list(errors.interface_loads),
         "interface": [_finite(error) for error in errors.interface],
         "inertia": [_finite(error) for error in errors.inertia],

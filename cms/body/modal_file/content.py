@@ -95,7 +95,7 @@ def content_of(body: ReducedBody, version: int) -> Content:
             values |= {
                 f"{path}/{name}": getattr(item, own)
                 for name, own in FIELDS[group].items()
-                if name not in GROUPS[group].if_any or getattr(item, own)
+                if name not in GROUPS[group].if_any or len(getattr(item, own))
             }
     datasets = {path: dataset_of(path, array, body.units) for path, array in values.items()}
     return Content(FORMAT, version, datasets, attributes)

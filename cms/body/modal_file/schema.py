@@ -153,6 +153,9 @@ ENTRIES = {
     "/errors/shape": Entry(
         "(n_judged,)", "estimated error of the shape in the norm of strain energy, relative to the shape",
     ),
+    "/errors/response": Entry(
+        "(n_judged,)", "estimated relative error of the receptance between the interfaces around each frequency",
+    ),
     "/errors/interface_loads": Entry("(n_loads,) text", "one per unit load at the interfaces, in words"),
     "/errors/interface": Entry(
         "(n_loads,)", "error of the static response to each of these loads in the norm of strain energy; NaN: the load "
@@ -323,7 +326,7 @@ class Group:
     attributes: Mapping[str, type] = field(default_factory=dict)  #: type of each attribute; bool is stored as 0 or 1
     names: Mapping[str, str] = field(default_factory=dict)  #: field of each dataset that has another name
     follows: tuple[str, ...] = ()  #: derived datasets, for other readers
-    if_any: tuple[str, ...] = ()  #: lists of texts that are left out if they are empty
+    if_any: tuple[str, ...] = ()  #: lists that are left out if they are empty
 
 
 NAME_AND_KIND = {"name": str, "kind": str}
@@ -338,7 +341,7 @@ GROUPS = {
     "/sets/<i>": Group(NamedSet, NAME_AND_KIND | {"size": int}),
     "/kept": Group(KeptPoints),
     "/columns": Group(SourceColumns),
-    "/errors": Group(ErrorEstimates, {"method": str, "date": str}, if_any=("interface_loads",)),
+    "/errors": Group(ErrorEstimates, {"method": str, "date": str}, if_any=("response", "interface_loads")),
     "/nodal_sums": Group(NodalSums, {"is_volume": bool}),
     "/quadratic": Group(ReducedBody, names={"g": "quadratic"}),
     "/stress/points": Group(PointStress, names={"position": "positions"}),

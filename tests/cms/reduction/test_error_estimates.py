@@ -1,6 +1,7 @@
 """Estimated errors of frequencies, shapes and static responses against dense solutions of the whole model."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -99,6 +100,29 @@ def test_the_error_of_a_shape_is_that_of_its_strain_energy(body, exact):
         phi = basis.Phi[:, k] / np.sqrt(basis.omega2[k])
         true.append(np.sqrt(max(0.0, 1 - (phi @ (K @ exact[1][:, k])) ** 2 / exact[0][k])))
     assert_allclose(made.errors.shape, true, rtol=0.1, atol=1e-4)
+
+
+@pytest.mark.parametrize("name", ["craig-bampton", "craig-bampton-ir", "krylov", "normal"])
+def test_errors_of_responses_are_near_those_of_a_dense_solution(body, exact, name):
+    """Forces and moments on both interfaces, with 1 % damping, at the 33 frequencies around each mode."""
+    with Families(body) as families:
+        made = reduce(families, MODE_SETS[name](families, **SETS[name]), frame=cms.NodalFrame("left"))
+    f, n = made.free_frequencies, len(made.errors.frequency)
+    ends = [0.05 * f[0], *(f[1:n] + f[: n - 1]) / 2, f[n - 1]]
+    damping = 0.02 * (body.M @ exact[1] * np.sqrt(exact[0])) @ (body.M @ exact[1]).T
+    scale = np.where(np.tile(np.arange(6) < 3, 2), 1.0, body.length)
+    true = []
+    for low, high in pairwise(ends):
+        own = cms.frf(made, np.linspace(low, high, 33) / body.units.time, damping=0.01)
+        errors = []
+        for omega, H in zip(2 * np.pi * np.linspace(low, high, 33), own.H, strict=True):
+            A = body.K.toarray() + 1j * omega * damping - omega**2 * body.M.toarray()
+            whole = la.inv(A)[np.ix_(body.b, body.b)] * np.outer(scale, scale)
+            errors.append(la.norm(H * np.outer(scale, scale) - whole) / la.norm(whole))
+        true.append(np.sqrt(np.mean(np.square(errors))))
+    assert max(true) > 1e-3
+    ratio = made.errors.response / true
+    assert ((ratio > 0.5) & (ratio < 1.5))[np.array(true) < 0.5].all()
 
 
 @pytest.mark.parametrize(
@@ -203,7 +227,7 @@ def test_errors_survive_a_file_and_other_units(body, tmp_path):
     made = cms.reduce(body, modes, errors=True)
     cms.write(made, tmp_path / "bar.h5")
     back = cms.read(tmp_path / "bar.h5").errors
-    for name in ("frequency", "bound", "shape", "interface", "inertia"):
+    for name in ("frequency", "bound", "shape", "response", "interface", "inertia"):
         assert_allclose(getattr(back, name), getattr(made.errors, name), rtol=0, atol=0)
     assert (back.method, back.date, back.interface_loads) == (
         made.errors.method, made.errors.date, made.errors.interface_loads

@@ -309,7 +309,7 @@ def compare_errors(case: Case) -> Iterator[Compared]:
     for name in ("method", "interface_loads"):
         yield same(f"errors.{name}", getattr(file, name), getattr(expected, name))
     yield same("errors.date", bool(file.date), True)
-    for name in ("frequency", "bound", "shape"):
+    for name in ("frequency", "bound", "shape", *(["response"] if len(file.response) else [])):
         wanted = getattr(expected, name)
         yield apart(f"errors.{name}", getattr(file, name), wanted, wanted + ROUNDING_OF_ERRORS, axes="mode")
     for name in ("interface", "inertia"):

@@ -112,6 +112,7 @@ FIELDS: Mapping[str, str] = {
     "errors.frequency": "error-estimates",
     "errors.bound": "error-estimates",
     "errors.shape": "error-estimates",
+    "errors.response": "error-estimates",
     "errors.interface_loads": "error-estimates",
     "errors.interface": "error-estimates",
     "errors.inertia": "error-estimates",
