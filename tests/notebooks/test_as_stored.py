@@ -1,14 +1,48 @@
 """Notebooks can be read without running them, and a claim between their lines that does not hold ends a run."""
 
+import ast
+
 import nbformat
 import pytest
 from nbclient import NotebookClient
 from nbclient.exceptions import CellExecutionError
 
+from fe_models.door import names_of, namespaces
 from tests.notebooks.running import NOTEBOOKS, SCREEN, cells, place, statements_of
 from tests.root import ROOT
 
 NAMES = sorted(path.stem for path in NOTEBOOKS.glob("*.ipynb"))
+PACKAGES = ("fe_models", "cms", "floatframe")
+#: names that notebooks import and that no namespace offers
+NOT_PUBLIC = {
+    "controlled_arm": {
+        "floatframe.model.bodies.mode_choice.with_modes", "floatframe.model.functions.time_functions.constant",
+        "floatframe.model.functions.time_functions.piecewise",
+    },
+    "deployable_antenna": {"floatframe.engine.compiling.system.compiled_system"},
+    "from_your_fe_program_to_a_motion": {"cms.jobs.body_of_job.job_body", "cms.jobs.job.read_job"},
+    "landing_gear": {"floatframe.model.functions.tables.monotone_table"},
+    "motor_bogie": {"floatframe.files.signals.orders.frequency_map", "floatframe.files.signals.signals.Signal"},
+    "railway_engine": {"floatframe.design.laboratory.body_figures.error_figure"},
+    "robot": {
+        "floatframe.model.functions.path_motions.path_motion", "floatframe.model.functions.tables.quintic_table",
+    },
+    "slender_beams": {"floatframe.model.functions.time_functions.polynomial_of_time"},
+    "spacecraft_tower": {
+        "cms.jobs.body_of_job.job_body", "cms.jobs.job.read_job", "floatframe.model.bodies.mode_choice.with_modes",
+        "floatframe.model.functions.tables.acceleration_table",
+        "fe_models.foundation.documents.write.write_document", "floatframe.durability.shaking.page.shake_document",
+    },
+    "suspension_arm": {
+        "cms.jobs.body_of_job.job_body", "cms.jobs.job.read_job", "floatframe.model.rotations.rotation_matrix",
+        *(f"floatframe.files.signals.{name}"
+          for name in ("Signals", "psd", "read_signals", "transfer_estimate", "write_rpc")),
+    },
+    "where_linear_frames_fail": {
+        "floatframe.model.functions.time_functions.cycloidal_spin_up",
+        "floatframe.model.functions.time_functions.polynomial_of_time",
+    },
+}  # fmt: skip
 CELL = "for k in range(3):\n    square = k * k\n    print(square)"
 
 
@@ -17,6 +51,30 @@ def test_a_notebook_keeps_what_its_cells_show_and_no_cell_is_longer_than_a_scree
     code = [(source, outputs) for kind, source, outputs in cells(name) if kind == "code"]
     assert any("image/png" in output.get("data", {}) for _, outputs in code for output in outputs)
     assert [source for source, _ in code if len(source.split("\n")) > SCREEN] == []
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_notebook_says_what_it_teaches_what_it_needs_and_what_comes_next(name):
+    words = [source for kind, source, _ in cells(name) if kind == "markdown"]
+    assert words[0].startswith("# ")
+    assert "**You learn** " in words[0]
+    assert "**You need** " in words[0]
+    assert "**Next:** " in words[-1]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_notebook_imports_public_names_and_those_of_machines(name):
+    public = {f"{module}.{each}" for package in PACKAGES for module in namespaces(package) for each in names_of(module)}
+    imported = {
+        f"{statement.module}.{each.name}"
+        for kind, source, _ in cells(name)
+        if kind == "code"
+        for statement in statements_of(source)
+        if isinstance(statement, ast.ImportFrom) and statement.module.split(".")[0] in PACKAGES
+        for each in statement.names
+    }
+    below = {each for each in imported - public if not each.startswith("floatframe.machines.")}
+    assert below == NOT_PUBLIC.get(name, set())
 
 
 @pytest.mark.parametrize("name", NAMES)
