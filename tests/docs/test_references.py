@@ -92,7 +92,9 @@ def is_name(dotted):
 
 
 #: modules of readers' own, in examples: a generated file, a package or script of theirs
-EXAMPLES = re.compile(r"(?:FILE|NAME|MODULE|rubber/\w+|buffers/\w+|mount|arm_forces|deck|part|test|bar(?:_\w+)?|pile)\.py")
+EXAMPLES = re.compile(
+    r"(?:FILE|NAME|MODULE|rubber/\w+|buffers/\w+|mount|arm_forces|deck|part|test|bar(?:_\w+)?|pile)\.py"
+)
 
 
 def test_modules_named_in_docstrings_comments_and_pages_exist():
