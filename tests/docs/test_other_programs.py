@@ -46,5 +46,5 @@ def test_commands_of_a_page_leave_their_files(page, rod, tmp_path):
     folder.mkdir()
     for name in given:
         shutil.copy(rod if name == "rod.h5" else DATA / name, folder)
-    assert walk_of(page, folder).missing == ()
+    assert list(walk_of(page, folder).missing) == []
     assert [name for name in made if not (folder / name).stat().st_size] == []
