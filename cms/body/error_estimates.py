@@ -16,7 +16,7 @@ __all__ = ["ErrorEstimates"]
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
 class ErrorEstimates:
-    """Errors of a reduced body relative to its finite element model, with four digits (docs/theory.md §8).
+    """Errors of a reduced body with four digits: by the reduction, and by the mesh (docs/theory.md §8).
 
     Parameters
     ----------
@@ -43,6 +43,13 @@ class ErrorEstimates:
         How the estimates were made, in words.
     date
         Day on which they were made, such as "2027-01-31".
+    mesh
+        Estimate of the relative error of each frequency of the finite element model by its mesh, (n_judged,); NaN: not
+        known, 10: 10 or more. Empty: not estimated.
+    mesh_sign
+        "+": these frequencies are too high; "+-": too high or too low.
+    mesh_method
+        How `mesh` was estimated, or why it is not known.
     """
 
     frequency: Annotated[Array, ArrayShape(("n_judged",))]
@@ -54,6 +61,9 @@ class ErrorEstimates:
     inertia: Annotated[Array, ArrayShape((None,), has_nan=True)] = field(default_factory=lambda: np.zeros(0))
     method: str = ""
     date: str = ""
+    mesh: Annotated[Array, ArrayShape((None,), has_nan=True)] = field(default_factory=lambda: np.zeros(0))
+    mesh_sign: str = ""
+    mesh_method: str = ""
 
     @property
     def distance(self) -> Array:

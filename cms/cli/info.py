@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 __all__ = ["info_command", "info_record", "print_body"]
 
 ROUNDING = 1e-9  #: relative error, below which the output says "exact"
+MESH_SIGNS = {"+": "+", "+-": "±"}
 MOST_SETS = 20  #: largest number of sets in the output
 
 
@@ -133,25 +134,38 @@ def print_free_frequencies(record: Any) -> None:
     if errors is None:
         say(f"{title} [Hz]: {', '.join(frequencies) or 'none'}\n")
         return
-    n = len(errors["frequency"])
+    n, mesh = len(errors["frequency"]), errors["mesh"]
+    of_mesh = [error_percent(error, MESH_SIGNS[errors["mesh_sign"]]) for error in mesh]
     print_table(
-        f"{title}, and their estimated errors by the reduction",
-        ("mode>", "Hz>", "error>", "at most>", "shape>", *(["response>"] if errors["response"] else [])),
+        f"{title}, and their estimated errors by the reduction{' and by the mesh' if of_mesh else ''}",
+        (
+            "mode>",
+            "Hz>",
+            "reduction>",
+            "at most>",
+            "shape>",
+            *(["response>"] if errors["response"] else []),
+            *(["mesh>"] if of_mesh else []),
+        ),
         [
             (
                 str(k + 1),
                 frequencies[k],
-                *(error_percent(errors[key][k]) for key in ("frequency", "distance", "shape")),
+                error_percent(errors["frequency"][k], "+"),
+                *(error_percent(errors[key][k]) for key in ("distance", "shape")),
                 *map(error_percent, errors["response"][k : k + 1]),
+                *of_mesh[k : k + 1],
             )
             for k in range(n)
         ],
     )
     say(
-        "error: an estimate, and the true error is not smaller; at most: some exact frequency is so near; shape: in "
-        "the norm of strain energy; response: estimate for the receptance between the interfaces around this "
+        "reduction: an estimate, and the true error is not smaller; at most: some exact frequency is so near; shape: "
+        "in the norm of strain energy; response: estimate for the receptance between the interfaces around this "
         "frequency, with 1 % damping"
     )
+    if errors["mesh_method"]:
+        say(f"mesh: {errors['mesh_method']}")
     if len(frequencies) > n:
         say(f"not judged [Hz]: {', '.join(frequencies[n:])}")
     for words, labels, values in (
@@ -166,11 +180,11 @@ def print_free_frequencies(record: Any) -> None:
     say("")
 
 
-def error_percent(value: float | None) -> str:
+def error_percent(value: float | None, sign: str = "") -> str:
     """Return a relative error in percent with two digits; "exact" if it is rounding, "" if it is not known."""
     if value is None:
         return ""
-    return "exact" if value < ROUNDING else f"{100 * value:.2g} %"
+    return "exact" if value < ROUNDING else f"{sign}{100 * value:.2g} %"
 
 
 def stiffening_words(record: Any) -> str:

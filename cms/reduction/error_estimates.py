@@ -40,6 +40,7 @@ from cms.linear_algebra.independent import Products
 from cms.modes.families.families import Families
 from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.free_basis import FreeBasis
+from cms.reduction.mesh_error import mesh_errors
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.tall.columns import combine, dots, gram, inner, subtract
@@ -110,6 +111,7 @@ def error_estimates(families: Families, modes: ModeSet, basis: FreeBasis) -> Err
     vibrating = modes.frequencies[~modes.is_static]
     n = int((frequencies <= (1 + EXACT) * vibrating.max()).sum()) if len(vibrating) else min(JUDGED, len(frequencies))
     n = min(max(n, 1), len(frequencies))
+    mesh = mesh_errors(families.body, basis, n)
     loads, interface = interface_errors(families, basis)
     interface = four_digits(interface, STATIC_ROUNDING)
     inertia = four_digits(energy_error(families.body, basis, families.Psi_H), STATIC_ROUNDING)
@@ -127,6 +129,9 @@ def error_estimates(families: Families, modes: ModeSet, basis: FreeBasis) -> Err
         inertia,
         METHOD,
         datetime.now(UTC).date().isoformat(),
+        mesh=four_digits(mesh.frequency, FREQUENCY_ROUNDING) if mesh.sign else np.zeros(0),
+        mesh_sign=mesh.sign,
+        mesh_method=mesh.method,
     )
 
 

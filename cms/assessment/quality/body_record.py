@@ -124,6 +124,9 @@ def errors_record(errors: ErrorEstimates) -> dict[str, Any]:
         "inertia": [_finite(error) for error in errors.inertia],
         "method": errors.method,
         "date": errors.date,
+        "mesh": [_finite(error) for error in errors.mesh],
+        "mesh_sign": errors.mesh_sign,
+        "mesh_method": errors.mesh_method,
     }
 
 

@@ -90,7 +90,9 @@ def content_of(body: ReducedBody, version: int) -> Content:
             path = group.replace("<i>", str(k))
             kinds = GROUPS[group].attributes
             attributes[path] = {
-                name: int(getattr(item, name)) if kind is bool else getattr(item, name) for name, kind in kinds.items()
+                name: int(getattr(item, name)) if kind is bool else getattr(item, name)
+                for name, kind in kinds.items()
+                if name not in GROUPS[group].if_any or getattr(item, name)
             }
             values |= {
                 f"{path}/{name}": getattr(item, own)
@@ -192,9 +194,11 @@ def fields_of(contents: Contents, group: str, k: int = 0) -> dict[str, Any]:
     """Return the fields of the object in a group of `GROUPS`, or in the k-th of its groups."""
     path = group.replace("<i>", str(k))
     layout, known = GROUPS[group], contents.content.datasets
+    stored = contents.content.attributes.get(path, {})
     attributes = {
         name: kind(contents.attribute(path, name, int if kind is bool else kind))
         for name, kind in layout.attributes.items()
+        if name not in layout.if_any or name in stored
     }
     datasets = {
         own: () if name in layout.if_any and f"{path}/{name}" not in known else contents.value(f"{path}/{name}")

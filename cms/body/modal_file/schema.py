@@ -162,6 +162,10 @@ ENTRIES = {
         "does not deform the body",
     ),
     "/errors/inertia": Entry("(n_r,)", "the same for each rigid-body acceleration with fixed interfaces"),
+    "/errors/mesh": Entry(
+        "(n_judged,)", "estimated relative error of these frequencies of the finite element model by its mesh; NaN: "
+        "not known; 10: 10 or more",
+    ),
     "/nodal_sums/w": Entry("()", "sum over the nodes of their weight w, the volume each stands for", VOLUME),
     "/nodal_sums/S": Entry("(3,)", "sum of w c_a", Dimensions(0, 4)),
     "/nodal_sums/R": Entry("(3, 3)", "sum of w c_a c_b", Dimensions(0, 5)),
@@ -326,7 +330,7 @@ class Group:
     attributes: Mapping[str, type] = field(default_factory=dict)  #: type of each attribute; bool is stored as 0 or 1
     names: Mapping[str, str] = field(default_factory=dict)  #: field of each dataset that has another name
     follows: tuple[str, ...] = ()  #: derived datasets, for other readers
-    if_any: tuple[str, ...] = ()  #: lists that are left out if they are empty
+    if_any: tuple[str, ...] = ()  #: lists and attributes that are left out if they are empty
 
 
 NAME_AND_KIND = {"name": str, "kind": str}
@@ -341,7 +345,11 @@ GROUPS = {
     "/sets/<i>": Group(NamedSet, NAME_AND_KIND | {"size": int}),
     "/kept": Group(KeptPoints),
     "/columns": Group(SourceColumns),
-    "/errors": Group(ErrorEstimates, {"method": str, "date": str}, if_any=("response", "interface_loads")),
+    "/errors": Group(
+        ErrorEstimates,
+        {"method": str, "date": str, "mesh_sign": str, "mesh_method": str},
+        if_any=("response", "interface_loads", "mesh", "mesh_sign", "mesh_method"),
+    ),
     "/nodal_sums": Group(NodalSums, {"is_volume": bool}),
     "/quadratic": Group(ReducedBody, names={"g": "quadratic"}),
     "/stress/points": Group(PointStress, names={"position": "positions"}),

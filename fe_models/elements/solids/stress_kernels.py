@@ -6,7 +6,8 @@ from numba import njit
 from fe_models.elements.solids.assembly_kernels import jacobian
 
 __all__ = [
-    "add_element_stress", "add_internal_forces", "stress_and_products", "volume_at_nodes", "write_scalar_matrices",
+    "add_element_stress", "add_internal_forces", "add_stress_defects", "stress_and_products", "volume_at_nodes",
+    "write_cell_stress", "write_scalar_matrices",
 ]  # fmt: skip
 
 jit = njit(cache=True, nogil=True, error_model="numpy")
@@ -217,3 +218,63 @@ def add_element_stress(nodes, cells, of_cell, of_node, tensors, dN, w, extrapola
                     row, column = stress[node, i, first:last], sigma[q, i]
                     for k in range(n_k):
                         row[k] += factor * column[k]
+
+
+# stress recovered at the nodes, against that of the elements ----------------------------------------------------------
+
+
+@jit
+def write_cell_stress(nodes, cells, of_cell, tensors, dN, u, part, n_parts, sigma):
+    """Write the stress at the points of one part of the elements, (n_cells, n_points, 6, k), for u, (n_nodes, 3, k)."""
+    x = np.empty((cells.shape[1], 3))
+    J, Q, H = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3, u.shape[2]))
+    for e in range(part * cells.shape[0] // n_parts, (part + 1) * cells.shape[0] // n_parts):
+        for a in range(cells.shape[1]):
+            for i in range(3):
+                x[a, i] = nodes[cells[e, a], i]
+        for q in range(dN.shape[0]):
+            det = jacobian(x, dN[q], J, Q)
+            add_gradient(u, cells[e], dN[q], Q, det, H)
+            write_stress(H, tensors[of_cell[e]], 1.0, sigma[e, q])
+
+
+@jit
+def add_stress_defects(
+    nodes, cells, of_cell, tensors, compliances, N, dN, w, u, rows, recovered, part, n_parts, defect, energy
+):
+    """Add ∫ d · C⁻¹ d dV with d = recovered stress - stress, and ∫ sigma · C⁻¹ sigma dV, of a part of the elements.
+
+    u: displacement columns, (n_nodes, 3, k); recovered: stress at the nodes, (n_rows, 6, k); rows: its row for each
+    node of each element, (n_cells, n_a); compliances: C⁻¹ of every material, (n_materials, 6, 6); defect, energy:
+    (n_cells, k).
+    """
+    n_k = u.shape[2]
+    x = np.empty((cells.shape[1], 3))
+    J, Q, H = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3, n_k))
+    sigma, d = np.empty((6, n_k)), np.empty((6, n_k))
+    for e in range(part * cells.shape[0] // n_parts, (part + 1) * cells.shape[0] // n_parts):
+        S = compliances[of_cell[e]]
+        for a in range(cells.shape[1]):
+            for i in range(3):
+                x[a, i] = nodes[cells[e, a], i]
+        for q in range(w.size):
+            det = jacobian(x, dN[q], J, Q)
+            add_gradient(u, cells[e], dN[q], Q, det, H)
+            write_stress(H, tensors[of_cell[e]], 1.0, sigma)
+            for c in range(6):
+                for k in range(n_k):
+                    d[c, k] = -sigma[c, k]
+            for a in range(cells.shape[1]):
+                at, factor = rows[e, a], N[q, a]
+                for c in range(d.shape[0]):
+                    row, column = d[c], recovered[at, c]
+                    for k in range(n_k):
+                        row[k] += factor * column[k]
+            for b in range(6):
+                for c in range(6):
+                    s = S[b, c] * w[q] * det
+                    if s == 0.0:
+                        continue
+                    for k in range(n_k):
+                        defect[e, k] += s * d[b, k] * d[c, k]
+                        energy[e, k] += s * sigma[b, k] * sigma[c, k]

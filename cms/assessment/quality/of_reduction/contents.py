@@ -306,12 +306,16 @@ def compare_errors(case: Case) -> Iterator[Compared]:
     if file is None:
         return
     expected = error_estimates(case.families, case.modes, case.basis)
-    for name in ("method", "interface_loads"):
+    names = ["method", "interface_loads"] + (["mesh_sign", "mesh_method"] if file.mesh_method else [])
+    for name in names:
         yield same(f"errors.{name}", getattr(file, name), getattr(expected, name))
     yield same("errors.date", bool(file.date), True)
     for name in ("frequency", "bound", "shape", *(["response"] if len(file.response) else [])):
         wanted = getattr(expected, name)
         yield apart(f"errors.{name}", getattr(file, name), wanted, wanted + ROUNDING_OF_ERRORS, axes="mode")
+    if file.mesh_method:  # files of older programs have no estimate
+        got, wanted = (np.nan_to_num(each.mesh, nan=-1.0) for each in (file, expected))
+        yield apart("errors.mesh", got, wanted, np.abs(wanted) + ROUNDING_OF_ERRORS, axes="mode")
     for name in ("interface", "inertia"):
         got, wanted = (np.nan_to_num(getattr(each, name), nan=-1.0) for each in (file, expected))
         yield apart(f"errors.{name}", got, wanted, np.abs(wanted) + STATIC_ROUNDING, axes="load")

@@ -117,6 +117,9 @@ FIELDS: Mapping[str, str] = {
     "errors.interface": "error-estimates",
     "errors.inertia": "error-estimates",
     "errors.method": "error-estimates",
+    "errors.mesh": "error-estimates",
+    "errors.mesh_sign": "error-estimates",
+    "errors.mesh_method": "error-estimates",
     "errors.date": "error-estimates",
 }
 

@@ -1,0 +1,343 @@
+r"""Energy error of the elements of a mesh, by recovered stress (Zienkiewicz & Zhu).
+
+(1) sample the stress where it is most accurate, and fit it to patches of elements (`patches`): sigma*. It has no
+    jumps between elements of one material, or between shell cells that meet smoothly
+(2) remove the traction of sigma* on the free surface of solids. Without this step, the shear stress of torsion and of
+    bending would look exact in a wall of one or two layers of elements
+(3) integrate eta² = ∫ (sigma* - sigma) · C⁻¹ (sigma* - sigma) dV over each element, its energy error. For shells, N,
+    M and Q are in place of sigma; their drilling energy, which the exact solution does not have, is all error
+
+With M-normalised modes, an eigenvalue of conforming elements exceeds the exact one by lambda_h - lambda =
+|u - u_h|²_E - lambda |u - u_h|²_0, and the last term is of higher order. So sum eta² estimates lambda_h - lambda. For a
+rod of linear elements of length h, sigma = E u' is constant, sigma* - sigma is E u'' s about the middle, and sum eta² /
+lambda = (k h)² / 12, as in the exact eigenvalue lambda (1 + (k h)² / 12).
+
+Elements whose fields are not conforming, or whose energy is not fully integrated, also have errors that lower the
+eigenvalues. Then the sum only gives the size of an error of unknown sign.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.body.fe_body import ElementModel
+from fe_models.body.weld import WeldedModel, mesh_rows
+from fe_models.elements.beams.model import BeamModel
+from fe_models.elements.recovery.patches import PatchCells, patch_recovery
+from fe_models.elements.shells.elements import STRAIN_DEGREE, ShellCells
+from fe_models.elements.shells.model import ShellModel
+from fe_models.elements.shells.shapes import flat_quadrature, flat_shape
+from fe_models.elements.shells.stiffeners import StiffenedModel
+from fe_models.elements.solids.body import SolidModel
+from fe_models.elements.solids.elements import ShapeTable, reference_element
+from fe_models.elements.solids.incompatible import KIND, VOIGT, brick_chunks, brick_operators, gradient_stress
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.threads import in_threads
+from fe_models.meshes.boundary import CORNERS, boundary_facets
+from fe_models.meshes.cell_shapes import CELL_SHAPES
+from fe_models.meshes.mesh import Mesh
+
+__all__ = ["EnergyErrors", "energy_errors", "without_estimate"]
+
+SAMPLE_BYTES = 1e8  #: size of the sampled stress that is in memory at a time [bytes]
+EDGE = 0.1  #: share of a direction in n nᵀ, above which it is a normal of an edge or a corner
+SYMMETRIC = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))  #: components of a tensor: xx yy zz yz xz xy
+
+
+@dataclass(frozen=True, eq=False)
+class EnergyErrors:
+    """Energy errors of the elements whose stress can be recovered, numbered by part of the body, type and cell."""
+
+    error: Array  #: eta² of each element and column, (n_cells, k) [J]
+    energy: Array  #: twice the strain energy of each element and column, (n_cells, k) [J]
+    nonconforming: str  #: why the sign of the error of a frequency is not known; "": the frequencies are too high
+
+    @property
+    def total(self) -> Array:
+        """Sum of eta² over the elements, (k,) [J]."""
+        return np.asarray(self.error.sum(axis=0))
+
+
+def without_estimate(model: ElementModel | None) -> str:
+    """Return why no element of a body has an estimate of its energy error; "" if some elements have one."""
+    if model is None:
+        return "the body consists of matrices"
+    if isinstance(model, SolidModel) and model.parts is not None:
+        return "the mesh is distributed over ranks"
+    if isinstance(model, WeldedModel):
+        reasons = [without_estimate(part) for part in model.parts]
+        return reasons[0] if all(reasons) else ""
+    if isinstance(model, SolidModel | ShellModel | StiffenedModel):
+        return ""
+    return "the stress of beams is not recovered" if isinstance(model, BeamModel) else "no element has stress"
+
+
+def energy_errors(model: ElementModel, u: Array, loaded: IntArray) -> EnergyErrors:
+    """Return the energy errors of all solid and shell elements for displacement columns.
+
+    Parameters
+    ----------
+    model
+        Element model for which `without_estimate` returns "".
+    u
+        Displacement columns over the dofs of the mesh, (n_mesh_dof, k).
+    loaded
+        Nodes on which something else than inertia may act. Elsewhere the surface of solids is free of traction.
+    """
+    found = list(errors_of_parts(model, np.asarray(u), loaded))
+    return EnergyErrors(
+        np.concatenate([each.error for each in found]),
+        np.concatenate([each.energy for each in found]),
+        next((each.nonconforming for each in found if each.nonconforming), ""),
+    )
+
+
+def errors_of_parts(model: ElementModel, u: Array, loaded: IntArray) -> Iterator[EnergyErrors]:
+    """Yield the energy errors of the parts of a body that have an estimate."""
+    if isinstance(model, WeldedModel):
+        first = np.cumsum([0, *model.n_nodes])[:-1]
+        for part, rows, begin in zip(model.parts, mesh_rows(model.n_mesh_dof), first, strict=True):
+            if not without_estimate(part):
+                yield from errors_of_parts(part, u[rows], loaded - begin)
+    elif isinstance(model, StiffenedModel):
+        yield shell_errors(model.shell, u[: model.shell.n_mesh_dof])
+    elif isinstance(model, ShellModel):
+        yield shell_errors(model, u)
+    elif isinstance(model, SolidModel):
+        yield solid_errors(model, u, loaded)
+
+
+# solids ---------------------------------------------------------------------------------------------------------------
+
+
+def error_table(kind: str, integration: str) -> ShapeTable:
+    """Return the points at which the energy error of a cell is integrated: those of the stiffness, or more."""
+    element = reference_element(kind, integration)
+    return element.mass if kind == "tetra" else element.stiffness
+
+
+def solid_errors(model: SolidModel, u: Array, loaded: IntArray) -> EnergyErrors:
+    """Return the energy errors of a solid, in blocks of columns."""
+    mesh = model.mesh
+    tensors = np.array([material.stiffness for material in model.materials])
+    kinds = [kind for kind, cells in mesh.cells.items() if len(cells)]
+    # a node has one row for each material, because the stress jumps where materials meet
+    own = {kind: mesh.cells[kind] * len(tensors) + model.of_cell[kind][:, None] for kind in kinds}
+    keys = np.unique(np.concatenate([each.ravel() for each in own.values()]))
+    rows = {kind: np.searchsorted(keys, each) for kind, each in own.items()}
+    groups = [patch_cells(model, kind, rows[kind]) for kind in kinds]
+    order = 2 if all(CELL_SHAPES[kind].middles for kind in kinds) else 1
+    recovery = patch_recovery(mesh.nodes[keys // len(tensors)], groups, order)
+    surface, free = free_surface(model.mesh, loaded)
+    place = np.full(len(mesh.nodes), -1)
+    place[surface] = np.arange(len(surface))
+    on_surface = np.flatnonzero(place[keys // len(tensors)] >= 0)
+    P = free[place[keys[on_surface] // len(tensors)]]
+    n_samples = sum(group.samples.shape[0] * group.samples.shape[1] for group in groups)
+    width = max(1, int(SAMPLE_BYTES / (48 * n_samples)))
+    errors, energies = [], []
+    for first in range(0, u.shape[1], width):
+        columns = np.ascontiguousarray(u[:, first : first + width])
+        k = columns.shape[1]
+        sampled = [cell_stress(model, kind, tensors, columns).reshape(-1, 6 * k) for kind in kinds]
+        recovered = recovery.at_nodes(np.concatenate(sampled)).reshape(-1, 6, k)
+        recovered[on_surface] = P @ recovered[on_surface]  # (2)
+        parts = [cell_defects(model, kind, tensors, columns, rows[kind], recovered) for kind in kinds]
+        errors.append(np.concatenate([part[0] for part in parts]))
+        energies.append(np.concatenate([part[1] for part in parts]))
+    return EnergyErrors(np.hstack(errors), np.hstack(energies), nonconforming_solid(model))
+
+
+def free_surface(mesh: Mesh, loaded: IntArray) -> tuple[IntArray, Array]:
+    """Return nodes of the free surface, (n,), and the map of their stress to one without traction, (n, 6, 6).
+
+    With the mean T of n nᵀ over the facets at a node, whose eigenvectors are its normals, and the projection T on all
+    directions but these, the map is T sigma T. Re-entrant edges are left out, because stress is singular there.
+    """
+    N, mean, towards = np.zeros((len(mesh.nodes), 3, 3)), np.zeros((len(mesh.nodes), 3)), np.zeros((len(mesh.nodes), 3))
+    for kind, facets in boundary_facets(mesh).items():
+        x = mesh.nodes[facets[:, : CORNERS[kind]]]
+        normal = (
+            np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+            if x.shape[1] == 3
+            else np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])
+        )
+        area = np.linalg.norm(normal, axis=1)
+        outer = normal[:, :, None] * normal[:, None] / area[:, None, None]
+        center = x.mean(axis=1)
+        for column in facets.T:
+            np.add.at(N, column, outer)
+            np.add.at(mean, column, normal)
+            np.add.at(towards, column, center - mesh.nodes[column])
+    size = np.einsum("naa->n", N)
+    is_free = size > 0
+    is_free[loaded[(loaded >= 0) & (loaded < len(is_free))]] = False
+    share, axes = np.linalg.eigh(N / np.where(size > 0, size, 1.0)[:, None, None])
+    is_normal = share > EDGE
+    is_convex = np.einsum("na,na->n", mean, towards) < 0
+    is_free &= (is_normal.sum(axis=1) == 1) | is_convex
+    nodes = np.flatnonzero(is_free)
+    T = np.einsum("nab,nb,ncb->nac", axes[nodes], ~is_normal[nodes], axes[nodes])
+    P = np.zeros((len(nodes), 6, 6))
+    for row, (i, j) in enumerate(SYMMETRIC):
+        for column, (a, b) in enumerate(SYMMETRIC):
+            P[:, row, column] = T[:, i, a] * T[:, j, b] + (T[:, i, b] * T[:, j, a] if a != b else 0.0)
+    return nodes, P
+
+
+def nonconforming_solid(model: SolidModel) -> str:
+    """Return why frequencies of this solid may be too low; "": they are not."""
+    if model.incompatible and len(model.mesh.cells.get(KIND, ())):
+        return "bricks have incompatible modes"
+    return "the stiffness has reduced integration" if model.integration != "full" else ""
+
+
+def patch_cells(model: SolidModel, kind: str, rows: IntArray) -> PatchCells:
+    """Return the cells of a type with the positions of their stress points."""
+    shape = CELL_SHAPES[kind]
+    samples = np.einsum("pa,nai->npi", reference_element(kind).stress.values, model.mesh.nodes[model.mesh.cells[kind]])
+    return PatchCells(rows, len(shape.corners), shape.middles, samples)
+
+
+def is_incompatible(model: SolidModel, kind: str) -> bool:
+    """Whether cells of this type have incompatible modes."""
+    return model.incompatible and kind == KIND
+
+
+def cell_stress(model: SolidModel, kind: str, tensors: Array, u: Array) -> Array:
+    """Return the stress at the stress points of all cells of a type, (n_cells, n_points, 6, k) [Pa]."""
+    from fe_models.elements.solids.stress_kernels import write_cell_stress
+
+    cells, of_cell, nodes = model.mesh.cells[kind], model.of_cell[kind], model.mesh.nodes
+    if is_incompatible(model, kind):
+        return np.concatenate([sigma for _, sigma, _ in brick_stress(nodes, cells, tensors[of_cell], u)])
+    dN, k = reference_element(kind).stress.gradients, u.shape[1]
+    sigma = np.empty((len(cells), len(dN), 6, k))
+    in_threads(write_cell_stress, (nodes, cells, of_cell, tensors, dN, u.reshape(len(nodes), 3, k)), (sigma,))
+    return sigma
+
+
+def brick_stress(nodes: Array, cells: IntArray, tensors: Array, u: Array) -> Iterator[tuple[slice, Array, Array]]:
+    """Yield rows of bricks with incompatible modes, their stress, (n, 8, 6, k) [Pa], and volumes, (n, 8) [m³]."""
+    for rows, dofs in brick_chunks(cells):
+        B, volumes = brick_operators(nodes[cells[rows]], tensors[rows])
+        yield rows, gradient_stress(B @ u[dofs][:, None], tensors[rows])[:, :, VOIGT], volumes
+
+
+def cell_defects(
+    model: SolidModel, kind: str, tensors: Array, u: Array, rows: IntArray, recovered: Array
+) -> tuple[Array, Array]:
+    """Return eta² and twice the strain energy of all cells of a type, (n_cells, k) each [J]."""
+    from fe_models.elements.solids.stress_kernels import add_stress_defects
+
+    cells, of_cell, nodes = model.mesh.cells[kind], model.of_cell[kind], model.mesh.nodes
+    defect, energy = np.zeros((len(cells), u.shape[1])), np.zeros((len(cells), u.shape[1]))
+    compliances, table = np.linalg.inv(tensors), error_table(kind, model.integration)
+    if is_incompatible(model, kind):
+        for part, sigma, volumes in brick_stress(nodes, cells, tensors[of_cell], u):
+            d = np.einsum("pa,nack->npck", table.values, recovered[rows[part]]) - sigma
+            S = volumes[:, :, None, None] * compliances[of_cell[part], None]
+            defect[part] = (d * (S @ d)).sum(axis=(1, 2))
+            energy[part] = (sigma * (S @ sigma)).sum(axis=(1, 2))
+        return defect, energy
+    fields = u.reshape(len(nodes), 3, -1)
+    rule = (table.values, table.gradients, table.weights)
+    inputs = (nodes, cells, of_cell, tensors, compliances, *rule, fields, rows, recovered)
+    in_threads(add_stress_defects, inputs, (defect, energy))
+    return defect, energy
+
+
+# shells ---------------------------------------------------------------------------------------------------------------
+
+
+def shell_errors(model: ShellModel, u: Array) -> EnergyErrors:
+    """Return the energy errors of a shell, in blocks of columns.
+
+    The resultants are recovered as tensors N and M and vectors Q in mesh axes, separately on each smooth patch of
+    cells.
+    """
+    n_rows = model.skin.n_patches
+    places = np.zeros((n_rows, 3))
+    groups, n_samples = [], 0
+    for group, patch in zip(model.groups, model.skin.patch, strict=True):
+        places[patch.ravel()] = group.planes.corners.reshape(-1, 3)
+        shape = corner_values(group)
+        groups.append(PatchCells(patch, patch.shape[1], (), np.einsum("pc,nci->npi", shape, group.planes.corners)))
+        n_samples += len(patch) * len(shape)
+    recovery = patch_recovery(places, groups, 1, is_surface=True)
+    width = max(1, int(SAMPLE_BYTES / (8 * 24 * n_samples)))
+    errors, energies = [], []
+    for first in range(0, u.shape[1], width):
+        columns = np.asarray(u)[:, first : first + width]
+        k = columns.shape[1]
+        resultants = [cell_resultants(group, columns) for group in model.groups]
+        sampled = [
+            in_mesh_axes(group.planes.R, values).reshape(-1, 15 * k)
+            for group, (values, _) in zip(model.groups, resultants, strict=True)
+        ]
+        recovered = recovery.at_nodes(np.concatenate(sampled)).reshape(-1, 15, k)
+        parts = [
+            shell_defects(group, values, weights, np.einsum("pc,nctk->nptk", corner_values(group), recovered[patch]))
+            for group, patch, (values, weights) in zip(model.groups, model.skin.patch, resultants, strict=True)
+        ]
+        errors.append(np.concatenate([part[0] for part in parts]))
+        energies.append(np.concatenate([part[1] for part in parts]))
+    return EnergyErrors(np.hstack(errors), np.hstack(energies), "shell elements are not conforming")
+
+
+def corner_values(group: ShellCells) -> Array:
+    """Return the shape functions of the corners at the strain points, (n_points, c)."""
+    return flat_shape(group.kind, flat_quadrature(group.kind, STRAIN_DEGREE[group.kind])[0]).values
+
+
+def cell_resultants(group: ShellCells, u: Array) -> tuple[Array, Array]:
+    """Return N, M, Q and the drilling moment at the strain points, (n, p, 9, k), and areas of the points, (n, p)."""
+    values, weights = [], []
+    for rows in group.chunks():
+        strains = group.strains(rows)
+        n, p, _, d = strains.B.shape
+        found = (strains.B.reshape(n, 9 * p, d) @ u[group.dofs[rows]]).reshape(n, p, 9, -1)
+        values.append(group.elasticity(rows)[:, None] @ found)
+        weights.append(strains.weights)
+    return np.concatenate(values), np.concatenate(weights)
+
+
+def in_mesh_axes(R: Array, resultants: Array) -> Array:
+    """Return N and M as tensors (xx yy zz yz xz xy) and Q as vectors in mesh axes, (n, p, 15, k)."""
+    return np.asarray(directions_of(R)[:, None] @ resultants[:, :, :8])
+
+
+def directions_of(R: Array) -> Array:
+    """Return the map from N, M, Q in local axes to their 15 components in mesh axes, (n, 15, 8)."""
+    found = np.zeros((len(R), 15, 8))
+    for column, (i, j) in enumerate(((0, 0), (1, 1), (0, 1))):
+        tensor = R[:, :, i, None] * R[:, None, :, j]
+        if i != j:
+            tensor = tensor + tensor.transpose(0, 2, 1)
+        for row, (a, b) in enumerate(SYMMETRIC):
+            found[:, row, column] = found[:, 6 + row, 3 + column] = tensor[:, a, b]
+    found[:, 12:, 6:] = R[:, :, :2]
+    return found
+
+
+def shell_defects(group: ShellCells, resultants: Array, weights: Array, recovered: Array) -> tuple[Array, Array]:
+    """Return eta² and twice the strain energy of the cells, (n, k) each [J].
+
+    Parameters
+    ----------
+    resultants, weights
+        As `cell_resultants` returns them.
+    recovered
+        Recovered resultants at the strain points in mesh axes, (n, p, 15, k).
+    """
+    to_local = directions_of(group.planes.R).transpose(0, 2, 1).copy()
+    to_local[:, [2, 5]] /= 2  # a shear component is the mean of the two equal components of the tensor
+    twice = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 1.0, 1.0, 1.0])
+    d = -resultants
+    d[:, :, :8] += (to_local * twice)[:, None] @ recovered
+    inverse = np.empty((len(resultants), 9, 9))
+    for rows in group.chunks():
+        inverse[rows] = np.linalg.pinv(group.elasticity(rows), hermitian=True)
+    S = weights[:, :, None, None] * inverse[:, None]
+    return (d * (S @ d)).sum(axis=(1, 2)), (resultants * (S @ resultants)).sum(axis=(1, 2))
