@@ -18,7 +18,8 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 
 from fe_models.foundation.paths import sync_folder
-from fe_models.foundation.seal import SEAL_SIZE, Kind, altered, reason, seal_of
+from fe_models.foundation.seal import SEAL_SIZE, Kind, altered, newer, reason, seal_of
+from fe_models.foundation.words import quoted
 
 __all__ = [
     "DIGEST",
@@ -26,11 +27,13 @@ __all__ = [
     "Attribute",
     "Manifest",
     "as_attribute",
+    "attributes_of",
     "described",
     "digest_of",
     "opened",
     "own_items",
     "require_digest",
+    "stated_version",
     "write_sealed_file",
 ]
 
@@ -316,6 +319,19 @@ def opened(path: Path, kind: Kind, *, has_seal: bool) -> Iterator[Any]:
         raise altered(path, kind, f"HDF5 cannot read it ({reason(error)})") from error
 
 
+def stated_version(file: Any, path: Path, kind: Kind) -> int:
+    """Return the version of a file; raise the error of the kind if the file is of another kind or a later version."""
+    found, stated = (as_attribute(file.attrs.get(name)) for name in ("format", "version"))
+    if found != (kind.stored or kind.format):
+        what = f"format {quoted(found)}" if found else "HDF5 of another program"
+        raise kind.error(f"{path}: expected a {kind.format}, got {what}")
+    if not isinstance(stated, int) or stated < 1:
+        raise altered(path, kind, f"attribute 'version': expected a whole number, got {quoted(stated)}")
+    if stated > kind.version:
+        raise newer(path, kind, stated)
+    return stated
+
+
 def own_items(file: Any, path: Path, kind: Kind) -> dict[str, Any]:
     """Return the groups and datasets of a file by path, after a check that all of them lie in the file itself.
 
@@ -365,40 +381,56 @@ def require_stored(item: Any, where: str, path: Path, kind: Kind) -> None:
         raise altered(path, kind, f"{where[:80]!r} says {shape} values, of which the file holds {stored} bytes")
 
 
-def require_digest(items: Mapping[str, Any], path: Path, kind: Kind) -> None:
-    """Raise the error of the kind unless attributes and datasets match the digest; values are read in blocks."""
+def require_digest(
+    items: Mapping[str, Any], path: Path, kind: Kind, entry_of: Callable[[str, Any], Entry] | None = None
+) -> str:
+    """Return the digest of a file; raise the error of the kind unless attributes and datasets match it.
+
+    Parameters
+    ----------
+    items
+        Groups and datasets of the file by path.
+    path, kind
+        File and its kind, for messages.
+    entry_of
+        Function that reads a dataset and returns its entry of the manifest; default: numbers are read in blocks.
+    """
     import h5py
 
-    entries = []
+    entries, stated = [], None
     for where, item in items.items():
-        attributes = {name: as_attribute(item.attrs[name]) for name in item.attrs}
-        is_dataset = isinstance(item, h5py.Dataset)
-        expected = attributes.pop(SHA256 if is_dataset else DIGEST, None) if is_dataset or where == "/" else None
-        entries += [described(f"{where}@{name}", value)[2] for name, value in attributes.items()]
-        if is_dataset:
-            sha256 = sha256_of(item)
-            if sha256 != expected:
+        attributes = attributes_of(item)
+        if isinstance(item, h5py.Dataset):
+            expected = attributes.pop(SHA256, None)
+            entry = (entry_of or entry_in_blocks)(where, item)
+            if entry.sha256 != expected:
                 raise altered(path, kind, f"dataset {where} does not have its sha256")
-            entries.append(Entry(where, "int64" if item.dtype.kind in "iu" else "float64", item.shape, sha256))
+            entries.append(entry)
         elif where == "/":
-            digest = expected
-    if digest_of(entries) != digest:
+            stated = attributes.pop(DIGEST, None)
+        entries += [described(f"{where}@{name}", value)[2] for name, value in attributes.items()]
+    if digest_of(entries) != stated:
         raise altered(
             path, kind, "its contents do not have its digest (an attribute or a name was changed, or one is missing)"
         )
+    return str(stated)
 
 
-def sha256_of(item: Any) -> str:
-    """Return the sha256 of the numbers of a dataset, which is read in blocks."""
+def entry_in_blocks(where: str, item: Any) -> Entry:
+    """Return the manifest entry of a dataset of numbers, which is read in blocks."""
     digest = hashlib.sha256()
-    kind = "<i8" if item.dtype.kind in "iu" else "<f8"
-    if not item.shape:
-        return hashlib.sha256(np.asarray(item[()], dtype=kind).tobytes()).hexdigest()
+    name, kind = ("int64", "<i8") if item.dtype.kind in "iu" else ("float64", "<f8")
     each = max(1, int(np.prod(item.shape[1:])))
     step = max(1, BLOCK_VALUES // each)
-    for first in range(0, item.shape[0] if item.size else 0, step):
-        digest.update(np.ascontiguousarray(item[first : first + step], dtype=kind).tobytes())
-    return digest.hexdigest()
+    blocks = [slice(k, k + step) for k in range(0, item.shape[0] if item.size else 0, step)] if item.shape else [()]
+    for block in blocks:
+        digest.update(np.ascontiguousarray(item[block], dtype=kind).tobytes())
+    return Entry(where, name, item.shape, digest.hexdigest())
+
+
+def attributes_of(item: Any) -> dict[str, Any]:
+    """Return the attributes of a group or dataset."""
+    return {name: as_attribute(item.attrs[name]) for name in item.attrs}
 
 
 def as_attribute(value: Any) -> Any:

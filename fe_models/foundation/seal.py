@@ -27,6 +27,7 @@ class Kind:
     version: int  #: version of the format; a reader rejects later versions
     error: type[Exception]  #: error class; its text is written for the user
     writer: str  #: command or function that writes such files; messages name it
+    stored: str = ""  #: root attribute `format` of the HDF5 part; "": that of the seal
 
 
 def seal_of(file: IO[bytes], kind: Kind) -> bytes:

@@ -12,12 +12,13 @@ import h5py
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.hdf5_file import as_attribute, opened, own_items, require_digest
+from fe_models.foundation.hdf5_file import as_attribute, opened, own_items, require_digest, stated_version
 from fe_models.foundation.paths import near_file
 from fe_models.foundation.records import frozen_copies
-from fe_models.foundation.seal import Kind, altered, check_seal, newer
+from fe_models.foundation.seal import Kind, altered, check_seal
 from fe_models.foundation.words import quoted
-from floatframe.engine.kernels.memory import N_DRIFTS
+from floatframe.engine.kernels.memory import Rows
+from floatframe.engine.kernels.records import Size
 from floatframe.errors import ResultsError
 from floatframe.results.head import Head, head_of_text
 
@@ -38,13 +39,14 @@ log = logging.getLogger(__name__)
 
 FORMAT = "floatframe-results"
 VERSION = 2  #: version of the format; version 1 had no seal and no checksums
-KIND = Kind("results-file", VERSION, ResultsError, "`floatframe run` or `integrate`")
+KIND = Kind("results-file", VERSION, ResultsError, "`floatframe run` or `integrate`", stored=FORMAT)
 SEGMENTS = ".segments"  #: suffix after the name of the results file for the folder of segments
 VALIDITY = "validity"  #: attribute with the validity notes of a run
 ROWS_CHECKED = 1000  #: number of rows checked at a time
 RESTART = "restart"  #: group in a segment with the state of the integrator at its end
 
-DATASETS = {  # name in the file -> field of `Rows`, description
+#: field of `Rows`, which declares shape and unit, and description, by the name of the dataset in the file
+DATASETS = {
     "t": ("t", "time"),
     "position": ("r", "of the frame origins, ground axes, (n_t, n_bodies, 3)"),
     "euler_parameters": ("p", "w, x, y, z of R_GB, (n_t, n_bodies, 4)"),
@@ -104,25 +106,18 @@ class FileSource:
 
 
 def row_shapes(head: Head) -> dict[str, tuple[int, ...]]:
-    """Return the shape of one row of each dataset."""
-    n_b = len(head.bodies)
-    n_q = sum(body.n_q for body in head.bodies)
-    shapes: dict[str, tuple[int, ...]] = {
-        "t": (),
-        "position": (n_b, 3),
-        "euler_parameters": (n_b, 4),
-        "q": (n_q,),
-        "u": (6 * n_b + n_q,),
-        "u_dot": (6 * n_b + n_q,),
-        "w": (head.w0[-1],),
-        "diagnostics": (12,),
-        "drift": (len(head.joints), N_DRIFTS),
+    """Return the shape of one row of each dataset, as `Rows` declares it; a head of an older file lacks some."""
+    n_b, n_q = len(head.bodies), sum(body.n_q for body in head.bodies)
+    sizes = {"n_b": n_b, "n_q": n_q, "n_u": 6 * n_b + n_q, "n_w": head.w0[-1], "n_c": len(head.joints)}
+    optional = {"angles": head.angles, "loads": head.loads, "body loads": head.load_cases}
+    sizes |= {name: len(items) for name, items in optional.items() if items is not None}
+    declared = Rows()._asdict()
+    shapes = {name: declared[field].shape[1:] for name, (field, _) in DATASETS.items()}
+    return {
+        name: tuple(size.of(sizes) if isinstance(size, Size) else size for size in shape)
+        for name, shape in shapes.items()
+        if all(size.name in sizes for size in shape if isinstance(size, Size))
     }
-    if head.angles is not None:
-        shapes["angle"] = (len(head.angles),)
-    if head.loads is not None and head.load_cases is not None:
-        shapes |= {"load": (len(head.loads), 6), "load_case": (len(head.load_cases),)}
-    return shapes
 
 
 def segments_folder(path: str | os.PathLike[str]) -> Path:
@@ -153,13 +148,7 @@ def checked(path: Path, *, tell_age: bool = True) -> Iterator[tuple[Any, dict[st
     """
     has_seal = check_seal(path, KIND)
     with opened(path, KIND, has_seal=has_seal) as file:
-        found, stated = (as_attribute(file.attrs.get(name)) for name in ("format", "version"))
-        if found != FORMAT:
-            raise ResultsError(f"{path}: expected a results file of floatframe, got format {quoted(found)}")
-        if not isinstance(stated, int) or stated < 1:
-            raise altered(path, KIND, f"attribute 'version': expected a whole number, got {quoted(stated)}")
-        if stated > VERSION:
-            raise newer(path, KIND, stated)
+        stated = stated_version(file, path, KIND)
         items = own_items(file, path, KIND)
         if not has_seal and stated >= 2:
             require_digest(items, path, KIND)

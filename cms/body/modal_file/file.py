@@ -21,17 +21,19 @@ from cms.body.reduced_body import ReducedBody
 from cms.errors import CmsError, ModalFileError
 from fe_models.foundation.hdf5_file import (
     DIGEST,
-    SHA256,
+    Entry,
     Manifest,
     as_attribute,
+    attributes_of,
     described,
-    digest_of,
     opened,
     own_items,
+    require_digest,
+    stated_version,
     write_sealed_file,
 )
 from fe_models.foundation.paths import is_stream, part_of, replace_file
-from fe_models.foundation.seal import SEAL_SIZE, Kind, altered, check_seal, newer, reason, seal_of
+from fe_models.foundation.seal import SEAL_SIZE, Kind, check_seal, reason, seal_of
 from fe_models.foundation.tall.on_disk import release
 from fe_models.foundation.units import Units, unit_system
 
@@ -200,18 +202,6 @@ def read_sealed(path: str | os.PathLike[str], kind: Kind) -> Content:
         return Content(kind.format, version, *walk(file, path, kind))
 
 
-def stated_version(file: Any, path: Path, kind: Kind) -> int:
-    """Return the version of a file; raise an error if the file is of another kind or of a later version."""
-    found = as_attribute(file.attrs.get("format"))
-    if found != kind.format:
-        what = f"a {str(found)[:80]!r}" if found else "HDF5 of another program"
-        raise kind.error(f"{path}: not a {kind.format}: {what}")
-    stated = as_attribute(file.attrs.get("version"))
-    if isinstance(stated, int) and stated > kind.version:
-        raise newer(path, kind, stated)
-    return int(stated or 0)
-
-
 def fill(file: Any, content: Content) -> None:
     """Write the content into an open `h5py.File`; memory of arrays on disk is released after use."""
     attributes = {name: dict(group) for name, group in content.attributes.items()}
@@ -227,31 +217,17 @@ def fill(file: Any, content: Content) -> None:
 
 def walk(file: Any, path: Path, kind: Kind) -> tuple[dict[str, Dataset], dict[str, dict[str, Attribute]]]:
     """Return all datasets and group attributes; raise an error if one differs from its digest."""
-    import h5py
+    datasets: dict[str, Dataset] = {}
 
-    datasets, groups, entries = {}, {}, []
-    for name, item in own_items(file, path, kind).items():
-        attributes = {key: as_attribute(item.attrs[key]) for key in item.attrs}
-        written = {"/": DIGEST}.get(name) if not isinstance(item, h5py.Dataset) else SHA256
-        expected = attributes.pop(written, None) if written else None
-        entries += [described(f"{name}@{key}", value)[2] for key, value in attributes.items()]
-        if isinstance(item, h5py.Dataset):
-            values = as_values(item[()])
-            *_, entry = described(name, values)
-            if entry.sha256 != expected:
-                raise altered(path, kind, f"dataset {name} does not have its sha256")
-            datasets[name] = Dataset(values, str(attributes.get("unit", "1")), str(attributes.get("description", "")))
-            entries.append(entry)
-        else:
-            groups[name] = attributes
-            if name == "/":
-                digest = expected
-    if digest_of(entries) != digest:
-        raise altered(
-            path, kind, "its contents do not have its digest (an attribute or a name was changed, or one is missing)"
-        )
-    groups["/"][DIGEST] = str(digest)
-    return datasets, groups
+    def entry_of(name: str, item: Any) -> Entry:
+        """Keep the values of a dataset; return its entry of the manifest."""
+        values, attributes = as_values(item[()]), attributes_of(item)
+        datasets[name] = Dataset(values, str(attributes.get("unit", "1")), str(attributes.get("description", "")))
+        return described(name, values)[2]
+
+    items = own_items(file, path, kind)
+    require_digest(items, path, kind, entry_of)
+    return datasets, {name: attributes_of(item) for name, item in items.items() if name not in datasets}
 
 
 def as_values(value: Any) -> Any:

@@ -1,12 +1,13 @@
 """Results on disk: what a run, a stopped run and a killed run leave."""
 
 import json
+import re
 import shutil
 import signal
 import subprocess
 import sys
 import time
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import h5py
@@ -16,11 +17,15 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from fe_models.foundation.hdf5_file import Manifest, as_attribute, write_sealed_file
 from floatframe import GeneralizedAlpha, integrate, read_results
+from floatframe.engine.compiling.counted_angles import CountedAngle
+from floatframe.engine.kernels.memory import Rows
 from floatframe.errors import ConvergenceError, ModelError, ResultsError
+from floatframe.results.head import BodyEntry, Head
 from floatframe.results.place_motion import point_motion
 from floatframe.results.recovery import interface_positions, nodal_positions
-from floatframe.results.results_file import KIND
+from floatframe.results.results_file import DATASETS, KIND
 from tests.floatframe.results.examples import SYSTEM
+from tests.root import ROOT
 
 METHOD = GeneralizedAlpha()
 DATA = ("t", "position", "euler_parameters", "q", "u", "u_dot", "w", "diagnostics", "drift")
@@ -219,15 +224,15 @@ def test_no_damaged_byte_is_read(path):
 
 HEADS = {  # what is changed in the head -> what the message names
     "system": (lambda head: head.update(system=3), "system: expected text"),
-    "missing": (lambda head: head.pop("bodies"), "expected an object with"),
-    "unknown": (lambda head: head.update(more=1), "expected an object with"),
+    "missing": (lambda head: head.pop("bodies"), "bodies: missing"),
+    "unknown": (lambda head: head.update(more=1), "more: unknown key"),
     "units": (lambda head: head.update(units="mm"), "units: expected one of"),
     "n_q": (lambda head: head["bodies"][0].update(n_q=10**9), "bodies.1..q0"),
-    "negative": (lambda head: head["bodies"][1].update(n_q=-1), "n_q: expected 0 or more"),
+    "negative": (lambda head: head["bodies"][1].update(n_q=-1), "n_q: expected greater than or equal to 0"),
     "kind": (lambda head: head["bodies"][0].update(n_q="3"), "expected a whole number"),
     "name": (lambda head: head["bodies"][1].update(name="rod"), "a name of its own"),
     "w0": (lambda head: head.update(w0=[0, 9, 6]), "w0: expected"),
-    "joints": (lambda head: head.update(joints=[1, 2]), "joints: expected a list of names"),
+    "joints": (lambda head: head.update(joints=[1, 2]), "joints.0.: expected text"),
     "run": (lambda head: head["run"].update(h=float("nan")), "run.h: expected a finite number"),
     "gravity": (lambda head: head["run"].update(gravity=["g"]), "run.gravity"),
     "summary": (lambda head: head.update(summary={"n_steps": "many"}), "summary.n_steps"),
@@ -254,6 +259,23 @@ def test_a_head_that_is_no_object_is_refused_in_one_short_message(path, text):
         with pytest.raises(ResultsError) as error:
             read_results(rewritten(path, lambda values, attributes, name=name: attributes.update({name: text or " "})))
         assert len(str(error.value)) < 500
+
+
+def test_the_tables_of_the_specification_are_those_of_the_layout():
+    page = (ROOT / "docs" / "results_file.md").read_text("utf-8")
+    found = re.findall(r"^\| `(\w+)` \| \(([^|]*)\) \| ([^|]*)\|", page, re.MULTILINE)
+    names = {"angles": "n_angles", "loads": "n_loads", "body loads": "n_load_cases", "n_c": "n_joints"}
+    declared = {name: Rows()._asdict()[field] for name, (field, _) in DATASETS.items()}
+    shapes = {name: ", ".join(names.get(str(n), str(n)) for n in each.shape) for name, each in declared.items()}
+    assert {name: (shape, unit.strip()) for name, shape, unit in found} == {
+        name: (shapes[name], each.unit) for name, each in declared.items()
+    }
+
+
+@pytest.mark.parametrize("record", [Head, BodyEntry, CountedAngle])
+def test_every_key_of_the_head_is_in_the_specification(record):
+    page = (ROOT / "docs" / "results_file.md").read_text("utf-8")
+    assert [each.name for each in fields(record) if f"`{each.name}`" not in page and each.name not in "xyz"] == []
 
 
 def test_misshapen_and_missing_datasets_are_refused(path):
