@@ -96,7 +96,7 @@ class RelativeGeneralizedAlpha(Integrator):
         a, u_dot = memory.a.copy(), memory.u_dot + change
         for sign, each in ((1.0, u_dot), (-1.0, memory.u_dot)):
             _, joints = joint_iterate(compiled, tree, memory.state, each)
-            a += sign * in_slots(tree, joints, each, joints.acceleration)
+            a += sign * in_slots(tree, each, joints.acceleration)
         return after.changed(u_dot=u_dot, a=a), rows
 
     def observe(self, system: System, t: float, memory: Memory, work: Work) -> tuple[Memory, Rows]:
@@ -223,7 +223,7 @@ def kept_of(work: Work, model: Model, tree: Tree) -> Kept:
     return KEPT[key]
 
 
-def in_slots(tree: Tree, joints: JointWork, of_bodies: Array, of_columns: Array) -> Array:
+def in_slots(tree: Tree, of_bodies: Array, of_columns: Array) -> Array:
     """Return values of all unknowns at their positions in the memory, (n_u,), with zeros elsewhere."""
     result = np.zeros_like(of_bodies)
     is_mode = tree.mode >= 0
@@ -264,7 +264,7 @@ def joint_accelerations(
             else:
                 rest = alpha - (e @ omega) * np.cross(omega, e)
                 joints.acceleration[columns] = start[i].T @ rotation_exp(by_spin[i] * t * e) @ rest
-        return in_slots(tree, joints, u_dot + t * jerk, joints.acceleration)
+        return in_slots(tree, u_dot + t * jerk, joints.acceleration)
 
     now = at(0.0)
     return now, (at(s) - at(-s)) / (2 * s)
@@ -294,7 +294,7 @@ def shifted(
     work.states.base[:] = work_from(model, memory.w).states.base
     joints.d_start[:], joints.Q_start[:] = joints.d, joints.Q
     rate, is_column = joints.rate.copy(), tree.column >= 0
-    s_dot = in_slots(tree, joints, state.u, rate)[tree.slot]
+    s_dot = in_slots(tree, state.u, rate)[tree.slot]
     x = h * s_dot + h**2 * way[tree.slot]
     increments = np.zeros_like(rate)
     increments[tree.column[is_column]] = x[is_column]

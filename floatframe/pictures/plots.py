@@ -1,6 +1,5 @@
 """Plots of a computed motion; each function draws into given axes, or into a new figure."""
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,10 +15,6 @@ __all__ = [
     "plot_drift",
     "plot_energies",
     "plot_energy_balance",
-    "plot_modal_coordinates",
-    "plot_momentum",
-    "plot_positions",
-    "plot_reaction",
 ]
 
 SHOWN = 1e-6  #: smallest drift on the axis, relative to the largest drift
@@ -45,46 +40,6 @@ def plot_energy_balance(trajectory: Trajectory, ax: "Axes | None" = None) -> "Ax
     defect = balance_defect(trajectory) / (energy_scale(trajectory) or 1.0)
     ax.plot(trajectory.t, defect, "k", label="total - work + dissipated")
     return labelled(ax, "error of the energy balance / largest energy")
-
-
-def plot_momentum(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
-    """Plot components of linear momentum, and of angular momentum about the ground origin (right axis)."""
-    ax = axes_for(trajectory, ax)
-    units = trajectory.units
-    linear = f"{units.mass_symbol} {units.length_symbol}/{units.time_symbol}"
-    other = ax.twinx()
-    for a, axis in enumerate("xyz"):
-        ax.plot(trajectory.t, trajectory.linear_momentum[:, a], color=f"C{a}", label=f"linear {axis}")
-        other.plot(trajectory.t, trajectory.angular_momentum[:, a], "--", color=f"C{a}", label=f"angular {axis}")
-    labelled(other, f"angular momentum [{linear} {units.length_symbol}]")
-    return labelled(ax, f"linear momentum [{linear}]")
-
-
-def plot_positions(trajectory: Trajectory, body: str, ax: "Axes | None" = None) -> "Axes":
-    """Plot the components of the position of a body's frame origin, in ground axes."""
-    ax = axes_for(trajectory, ax)
-    for axis, values in zip("xyz", trajectory.body(body).r.T, strict=True):
-        ax.plot(trajectory.t, values, label=f"{body} {axis}")
-    return labelled(ax, f"position [{trajectory.units.length_symbol}]")
-
-
-def plot_modal_coordinates(
-    trajectory: Trajectory, body: str, ax: "Axes | None" = None, *, modes: Sequence[int] | None = None
-) -> "Axes":
-    """Plot modal coordinates of a body; `modes` are their indices, from 0 (default: all)."""
-    ax, units = axes_for(trajectory, ax), trajectory.units
-    q = trajectory.body(body).q
-    for k in range(q.shape[1]) if modes is None else modes:
-        ax.plot(trajectory.t, q[:, k], label=f"{body} q{k + 1}")
-    return labelled(ax, f"modal coordinate [{units.mass_symbol}$^{{1/2}}$ {units.length_symbol}]")
-
-
-def plot_reaction(trajectory: Trajectory, name: str, ax: "Axes | None" = None) -> "Axes":
-    """Plot the components of the force that a joint or spring-damper exerts on its marker A, in ground axes."""
-    ax = axes_for(trajectory, ax)
-    for axis, values in zip("xyz", trajectory.reaction(name).force.T, strict=True):
-        ax.plot(trajectory.t, values, label=f"{name} {axis}")
-    return labelled(ax, f"force [{trajectory.units.force_symbol}]")
 
 
 def plot_drift(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":

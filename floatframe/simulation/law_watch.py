@@ -95,9 +95,9 @@ def asked_laws(system: System, compiled: CompiledSystem) -> Iterator[AskedLaw]:
     for u, force in enumerate(force for force in system.forces if isinstance(force, UserForce)):
         if force.function is not None:
             yield asked_force(f"forces.{force.name}", compiled, u, len(system.couplers) + u, next(callbacks))
-    for i, placed in enumerate(compiled.laws):
+    for placed in compiled.laws:
         if not type(placed.element).__module__.startswith(OWN):
-            yield asked_element(f"elements.{placed.element.name}", compiled, i, placed)
+            yield asked_element(f"elements.{placed.element.name}", compiled, placed)
 
 
 def asked_force(where: str, compiled: CompiledSystem, u: int, i: int, callback: Callback) -> AskedLaw:
@@ -117,7 +117,7 @@ def asked_force(where: str, compiled: CompiledSystem, u: int, i: int, callback: 
     return AskedLaw(where, callback, lambda memory, _: np.array([0.0, *memory.w[unknowns]]), ask)
 
 
-def asked_element(where: str, compiled: CompiledSystem, i: int, placed: PlacedLaw) -> AskedLaw:
+def asked_element(where: str, compiled: CompiledSystem, placed: PlacedLaw) -> AskedLaw:
     """Return the law of an element as a checked function."""
     model = compiled.model
     first, n = int(model.connections.a[placed.connection]), len(placed.markers)

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -34,7 +34,6 @@ __all__ = ["CorrelationFile", "CorrelationResult", "correlate", "read_correlatio
 METRES = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254}
 OF_MESH = ("body", "mesh_size")  #: tables of a job that affect its mesh
 UNIVERSAL, TABLES = (".unv", ".uff", ".unv55", ".ufb"), (".csv", ".txt")
-Axis = Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
 
 
 class ModelTable(Table):

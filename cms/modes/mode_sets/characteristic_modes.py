@@ -67,7 +67,7 @@ def with_characteristic_modes(
             (interface.name,),
             np.asarray(interface.dofs),
             _columns_of(modes, interface),
-            _rigid_motions(body, interface, Psi_R),
+            _rigid_motions(interface, Psi_R),
         )
         for interface in body.interfaces
         if interface.kind == "nodes" and len(interface.nodes) > 1
@@ -131,7 +131,7 @@ def _columns_of(modes: ModeSet, interface: Interface) -> IntArray:
     return columns
 
 
-def _rigid_motions(body: FEBody, interface: Interface, Psi_R: Array) -> Array:
+def _rigid_motions(interface: Interface, Psi_R: Array) -> Array:
     """Return independent rigid-body motions of the dofs of an interface, orthonormal, (n, n_r)."""
     motions = Psi_R[np.asarray(interface.dofs)]
     motions = motions / np.maximum(np.linalg.norm(motions, axis=0), np.finfo(float).tiny)

@@ -135,7 +135,7 @@ def _coupling(here: str, block: DeckBlock, draft: Draft) -> None:
     leader = int(draft.nodes_of(here, given.get("REF NODE", ""))[0])
     members = surface_nodes(here, draft, given.get("SURFACE", ""))
     if "INFLUENCE RADIUS" in given:
-        members = _within(here, draft, leader, members, float(given["INFLUENCE RADIUS"]))
+        members = _within(draft, leader, members, float(given["INFLUENCE RADIUS"]))
     weighting = block.parameters.get("WEIGHTING METHOD", "UNIFORM").upper()
     if weighting != "UNIFORM":
         why = f"weights that fall with the distance ({weighting}): only UNIFORM"
@@ -160,7 +160,7 @@ def _coupling(here: str, block: DeckBlock, draft: Draft) -> None:
     draft.couplings.append(Coupling(name, draft.node_group(here, [leader]), ((group, 1.0),)))
 
 
-def _within(here: str, draft: Draft, leader: int, members: IntArray, radius: float) -> IntArray:
+def _within(draft: Draft, leader: int, members: IntArray, radius: float) -> IntArray:
     """Return the nodes within a distance from a node (INFLUENCE RADIUS)."""
     at = draft.mesh.coordinates[draft.mesh.rows_of(np.array([leader]))][0]
     away = np.linalg.norm(draft.mesh.coordinates[draft.mesh.rows_of(members)] - at, axis=1)

@@ -22,7 +22,7 @@ def numbers(line: str) -> list[float]:
     return [float(word.strip().upper().replace("D", "E") or 0) for word in line.rstrip(", ").split(",")]
 
 
-def read_material(here: str, block: DeckBlock, draft: Draft) -> None:
+def read_material(block: DeckBlock, draft: Draft) -> None:
     """Read elastic constants and density; add other data to the ledger."""
     name = draft.material
     if block.keyword == "MATERIAL":
@@ -116,7 +116,7 @@ def _compliance(young: Array, poisson: Array) -> Array:
     return np.asarray(S)
 
 
-def read_orientation(here: str, block: DeckBlock, draft: Draft) -> None:
+def read_orientation(block: DeckBlock, draft: Draft) -> None:
     """Read named axes: the first through point a, the second in the plane of a and b.
 
     If the block gives an angle, the axes are then rotated about one of the three.

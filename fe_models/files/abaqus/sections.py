@@ -59,7 +59,7 @@ def read_section(here: str, block: DeckBlock, draft: Draft) -> None:
     elif block.keyword == "TRANSFORM":
         read_transform(here, block, draft)
     elif block.keyword == "ORIENTATION":
-        read_orientation(here, block, draft)
+        read_orientation(block, draft)
     elif block.keyword == "NODAL THICKNESS":
         read_nodal_thickness(here, block, draft)
     elif block.keyword == "NORMAL":
@@ -99,7 +99,7 @@ def _solid_section(here: str, block: DeckBlock, draft: Draft) -> None:
             continue
         if rule[2]:
             draft.ledger.note(kind_name, rule[2], count=len(elements), line=block.line_number)
-        rules.setdefault(_common_rule(kind, rule), []).append(elements)
+        rules.setdefault(_common_rule(rule), []).append(elements)
     for (integration, mass), parts in rules.items():
         own = name if len(rules) == 1 else f"{name}_{integration}_{mass}"
         orientation = block.parameters.get("ORIENTATION", "").strip('"')
@@ -126,7 +126,7 @@ def _rods(name: str, block: DeckBlock, draft: Draft, elements: IntArray) -> None
     draft.rods.append(RodSection(draft.cell_group(name, elements), _material_of(block, draft), area))
 
 
-def _common_rule(kind: str, rule: tuple[str, str, str]) -> tuple[str, str]:
+def _common_rule(rule: tuple[str, str, str]) -> tuple[str, str]:
     return rule[0], rule[1]
 
 

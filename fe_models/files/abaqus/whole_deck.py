@@ -39,7 +39,7 @@ _NAMED = {
 }  #: fixed components of each named support
 
 
-def read_boundary(here: str, block: DeckBlock, draft: Draft, step: str) -> None:
+def read_boundary(here: str, block: DeckBlock, draft: Draft) -> None:
     """Record which components of which nodes are fixed, and under which name."""
     for line in block.lines:
         words = [word.strip() for word in line.rstrip(", ").split(",")]
@@ -236,7 +236,7 @@ def read_abaqus_deck(path: Path, data: bytes, *, program: str = "calculix") -> D
                 steps = f"step{step}"
             elif block.keyword == "MATERIAL":
                 draft.material = block.parameters.get("NAME", "")
-                read_material(here, block, draft)
+                read_material(block, draft)
             else:
                 _take(here, block, draft, steps)
         except (ValueError, IndexError) as error:
@@ -258,13 +258,13 @@ def _take(here: str, block: DeckBlock, draft: Draft, step: str) -> None:
     if keyword == "ELEMENT":
         read_element(here, block, draft)
     elif keyword in _MATERIAL:
-        read_material(here, block, draft)
+        read_material(block, draft)
     elif keyword in _SECTIONS:
         read_section(here, block, draft)
     elif keyword in _COUPLINGS:
         read_coupling(here, block, draft)
     elif keyword == "BOUNDARY":
-        read_boundary(here, block, draft, step)
+        read_boundary(here, block, draft)
     elif keyword in _LOADS:
         read_load(here, block, draft, step)
     elif keyword == "SURFACE":

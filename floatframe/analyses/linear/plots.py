@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["campbell_figure", "plot_campbell", "plot_root_locus"]
+__all__ = ["campbell_figure", "plot_campbell"]
 
 
 ROUNDING = 1e-12  #: rounding error of a response, relative to the largest amplitude with the same unit
@@ -88,23 +88,6 @@ def campbell_figure(locus: Locus, *, time_unit: float = 1.0) -> "Figure":
     if still:
         figure.suptitle(f"zero: {', '.join(still)}", fontsize="small", color="0.4")
     return figure
-
-
-def plot_root_locus(locus: Locus, ax: "Axes | None" = None) -> "Axes":
-    """Plot eigenvalues in the complex plane, coloured by parameter value."""
-    ax = _axes() if ax is None else ax
-    for column in locus.eigenvalues.T:
-        ax.plot(column.real, column.imag, color="0.75", linewidth=1, zorder=1)
-        points = ax.scatter(column.real, column.imag, c=locus.values, s=18, cmap="viridis", zorder=2)
-    start = locus.eigenvalues[0]
-    ax.scatter(start.real, start.imag, s=46, facecolors="none", edgecolors="k", linewidths=0.9, label="first value")
-    ax.legend(fontsize="small")
-    ax.figure.colorbar(points, ax=ax, label=locus.parameter)
-    ax.axvline(0, color="0.3", linewidth=0.8)
-    ax.set_xlabel("real part [1/s]")
-    ax.set_ylabel("imaginary part [1/s]")
-    ax.grid(alpha=0.3)
-    return ax
 
 
 def _axes() -> "Axes":

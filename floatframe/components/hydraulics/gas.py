@@ -12,10 +12,9 @@ from numba.extending import register_jitable
 
 from fe_models.foundation.arrays import Array
 
-__all__ = ["GAS_NUMBERS", "gas_numbers", "oil_in_accumulator"]
+__all__ = ["gas_numbers", "oil_in_accumulator"]
 
 ROUNDING = 0.01  #: half width w of the rounding, relative to the pressure at the corner
-GAS_NUMBERS = 13  #: number of values from `gas_numbers`
 
 
 def gas_numbers(volume: float, charge: float, exponent: float, limit: float) -> Sequence[float]:

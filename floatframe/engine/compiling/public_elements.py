@@ -160,7 +160,7 @@ def add_element(system: System, made: Connections, elements: PublicElements, ele
     on_ground = tuple(marker.body < 0 for marker in markers)
     r, A = (np.array(each) for each in zip(*poses, strict=True))
     law = law_of(element, Placed(r, A, on_ground, system.units))
-    ends, sources = acting_ends(where, markers, law)
+    ends, sources = acting_ends(markers, law)
     rows = [Row(PART)] * (len(sources) + 3 * len(law.states)) + [held_row(*each) for each in held(law)]
     first_marker, w0 = made.add(element.name, ELEMENT, ends, rows, has_rates=True)
     if law.accelerations:
@@ -220,7 +220,7 @@ def law_of(element: Element, placed: Placed) -> ElementLaw:
     return replace(law, acts=acts, data=np.concatenate([law.data, np.zeros(len(law.switches))]))
 
 
-def acting_ends(where: str, markers: list[MarkerData], law: ElementLaw) -> tuple[list[End], list[tuple[int, float]]]:
+def acting_ends(markers: list[MarkerData], law: ElementLaw) -> tuple[list[End], list[tuple[int, float]]]:
     """Return the loaded ends, and the source index and sign of each of their wrench rows."""
     ends: list[End] = []
     sources: list[tuple[int, float]] = []

@@ -91,7 +91,7 @@ def make_tree(system: System) -> SystemTree:
     """Return the tree of a system."""
     compiled = compiled_system(system)
     charts = charts_of(system, compiled)
-    branches = spanning_tree(system, compiled.model, charts)
+    branches = spanning_tree(compiled.model, charts)
     taken = {branch.joint for branch in branches}
     names = compiled.joint_names
     return SystemTree(
@@ -152,7 +152,7 @@ def require_freedoms(compiled: CompiledSystem, joint: int, columns: tuple[Column
         )
 
 
-def spanning_tree(system: System, model: Model, charts: dict[int, tuple[Column, ...]]) -> list[Branch]:
+def spanning_tree(model: Model, charts: dict[int, tuple[Column, ...]]) -> list[Branch]:
     """Return the branches of the spanning tree with the fewest freedoms, each after its parent."""
     ends = {
         k: (int(model.markers.body[model.connections.a[k]]), int(model.markers.body[model.connections.b[k]]))

@@ -155,7 +155,7 @@ class Master:
     def begin(self) -> None:
         """Initialise the system, the connected columns and the units; raise an error for algebraic loops."""
         self.unit.begin()
-        outputs = {each.name: each for each in output_variables(self.unit, self.unit.system)}
+        outputs = {each.name: each for each in output_variables(self.unit)}
         for source, (sensor, column) in self.sensors.items():
             names = [name for name in outputs if name.rpartition(".")[0] == sensor.name]
             name = f"{sensor.name}.{column}" if column else names[0]

@@ -12,7 +12,6 @@ from floatframe.errors import FloatframeError, ModelError, SystemFileError
 from floatframe.files.cosimulation.unit import Unit
 from floatframe.files.system_file.read_system import read_system
 from floatframe.files.system_file.run_section import RunOptions, required_run
-from floatframe.model.system import System
 from floatframe.results.sensors import (
     AngleSensor,
     DisplacementSensor,
@@ -140,7 +139,7 @@ def interface(unit: Unit, content: Mapping[str, Any], paths: Mapping[str, str], 
         for k, (name, symbol) in enumerate(held.variables(system.units.time_symbol)):
             start = held.start if k == 0 else 0.0
             found.append(Variable(name, "input", symbol, held.words, start, is_drive=held.is_drive))
-    found += output_variables(unit, system)
+    found += output_variables(unit)
     seen: set[str] = set()
     for each in found:
         if each.name in seen:
@@ -149,7 +148,7 @@ def interface(unit: Unit, content: Mapping[str, Any], paths: Mapping[str, str], 
     return tuple(found)
 
 
-def output_variables(unit: Unit, system: System) -> Iterator[Variable]:
+def output_variables(unit: Unit) -> Iterator[Variable]:
     """Yield the outputs of an initialised unit."""
     for (sensor, _), measurement in zip(unit.sensors, unit.measured(), strict=True):
         is_of_state = isinstance(sensor, OF_THE_STATE) or (

@@ -181,7 +181,7 @@ class Reader:
                     "first: xacro robot.urdf.xacro > robot.urdf"
                 )
 
-    def count_unread(self, element: Element, within: str = "") -> None:
+    def count_unread(self, element: Element) -> None:
         """Count child elements that are ignored."""
         known = READ.get(element.tag)
         for child in element.children:

@@ -15,7 +15,7 @@ from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.words import nearest, quoted, shortened
 from floatframe.errors import ModelError, UrdfError
-from floatframe.model.checked_values import array_of_shape, number, unit_vector
+from floatframe.model.checked_values import array_of_shape
 from floatframe.model.shapes import Box, Cylinder, Sphere
 
 __all__ = [
@@ -312,19 +312,3 @@ class Robot:
         if name not in self.by_joint:
             raise UrdfError(f"{self.where()}: there is no joint {quoted(name)}{nearest(name, self.by_joint)}")
         return self.by_joint[name]
-
-
-def checked_axis(where: str, values: Array) -> Array:
-    """Return a unit vector along the axis; `UrdfError` for a zero vector."""
-    try:
-        return unit_vector(where, values)
-    except ValueError as error:
-        raise UrdfError(str(error)) from None
-
-
-def checked_number(where: str, value: float) -> float:
-    """Return a finite number; `UrdfError` for other values."""
-    try:
-        return number(where, value)
-    except ValueError as error:
-        raise UrdfError(str(error)) from None

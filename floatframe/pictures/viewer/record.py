@@ -250,7 +250,7 @@ def stage_record(shown: Shown, surfaces: list[FlexibleSurface], block: Block) ->
             }
             for each in strongest(cast)
         ],
-        "trails": trails(cast, len(trajectory.body_names)),
+        "trails": trails(cast),
         "ground": ground_record(cast, stage),
         "view": {
             "low": stage.low.tolist(),
@@ -329,7 +329,7 @@ def strongest(cast: Cast) -> list[Any]:
     return own + others[:MOST_FORCES]
 
 
-def trails(cast: Cast, n_bodies: int) -> list[int]:
+def trails(cast: Cast) -> list[int]:
     """Return the carriers whose paths are drawn: markers of joints and interfaces on bodies."""
     used = [k for k, carrier in enumerate(cast.carriers.found) if carrier.body >= 0]
     return used[:24]

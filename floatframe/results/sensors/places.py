@@ -11,7 +11,6 @@ import numpy as np
 
 from cms.body.address import Address, FoundNodes
 from cms.errors import BodyError
-from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.foundation.arrays import Array, GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.engine.compiling.counted_angles import CountedAngle, angle_of
@@ -41,7 +40,6 @@ __all__ = [
     "found_at",
     "found_nodes",
     "is_at_node",
-    "nearest_node",
     "node_marker",
     "place_motion",
     "require_turning",
@@ -145,17 +143,6 @@ def frame_marker(system: System, where: str, marker: Marker) -> MarkerData:
     assert isinstance(body, FlexibleBody)
     axes = body.moved.frame.axes.T @ body.reduced.frame.axes
     return MarkerData(find_body(system, where, name), MarkerShape(np.zeros(3), axes))
-
-
-def nearest_node(body: FlexibleBody, position: Array, *, where: str = "place", tolerance: float = TOLERANCE) -> int:
-    """Return the row of the kept node at a position in mesh axes of the undeformed mesh.
-
-    Raises
-    ------
-    ModelError
-        If its distance exceeds the tolerance, which is relative to the size of the body.
-    """
-    return int(found_at(body, where, Address(position=position, tolerance=tolerance)).rows[0])
 
 
 @frozen_copies

@@ -40,15 +40,7 @@ def test_energies_are_drawn_over_time_and_zero_ones_left_out(motion):
     assert ax.get_ylabel() == "energy [N m]"
 
 
-def test_positions_and_modal_coordinates_are_drawn_into_given_axes(motion):
-    ax = plots.plot_positions(motion, "bob")
-    assert_array_equal(ax.get_lines()[2].get_ydata(), motion.body("bob").r[:, 2])
-    n = len(ax.get_lines())
-    assert plots.plot_modal_coordinates(motion, "rod", ax, modes=(1,)) is ax
-    assert_array_equal(ax.get_lines()[n].get_ydata(), motion.body("rod").q[:, 1])
-
-
-@pytest.mark.parametrize("plot", [plots.plot_drift, plots.plot_energy_balance, plots.plot_momentum])
+@pytest.mark.parametrize("plot", [plots.plot_drift, plots.plot_energy_balance])
 def test_every_plot_of_the_whole_motion_has_lines_and_labels(motion, plot):
     ax = plot(motion)
     assert ax.get_lines()
@@ -64,11 +56,6 @@ def test_drift_that_is_rounding_beside_the_largest_is_counted_and_not_drawn(moti
     line, _ = ax.get_lines()  # of two joints, the distances alone
     assert_array_equal(np.asarray(line.get_ydata())[1:], 1e-9 * size[1:])
     assert ax.get_title(loc="right") == "the largest 2 of 4"
-
-
-def test_reaction_is_drawn_by_component(motion):
-    ax = plots.plot_reaction(motion, "link")
-    assert_array_equal(ax.get_lines()[0].get_ydata(), motion.reaction("link").force[:, 0])
 
 
 def test_the_drift_of_many_joints_is_not_hidden_under_its_legend(motion, monkeypatch):

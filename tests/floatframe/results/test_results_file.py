@@ -161,7 +161,7 @@ def test_files_of_another_kind_are_refused(tmp_path):
         read_results(path)
     with h5py.File(path, "w") as file:
         file.attrs["format"] = "modal-file"
-    with pytest.raises(ResultsError, match=r"expected a results file .* 'modal-file'"):
+    with pytest.raises(ResultsError, match="expected a results-file, got format 'modal-file'"):
         read_results(path)
 
 

@@ -168,7 +168,7 @@ def _weld(model: NastranModel, shells: _Shells, card: Card) -> str:
     else:
         return f"{kind or 'blank'}: expected PARTPAT, ELPAT, ELEMID, GRIDID or ALIGN"
     L = float(np.linalg.norm(ends[1] - ends[0]))
-    why = _length_why(model, known, L, D, thickness)
+    why = _length_why(known, L, D, thickness)
     if why:
         return why
     E, G = material.young, model.shear_modulus(known.text(2))
@@ -185,7 +185,7 @@ def _weld(model: NastranModel, shells: _Shells, card: Card) -> str:
     return ""
 
 
-def _length_why(model: NastranModel, known: Card, L: float, D: float, thickness: float) -> str:
+def _length_why(known: Card, L: float, D: float, thickness: float) -> str:
     """Return why the length of a weld is ambiguous; empty if it is not.
 
     Older versions of Nastran scale the stiffness of a weld that is shorter than LDMIN D or longer than LDMAX D; newer

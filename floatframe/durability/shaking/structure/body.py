@@ -80,7 +80,7 @@ def held_by_bases(where: str, M: Array, K: Array, G: Array, R: Array, scale: Arr
     rank = int((values > RANK * values[0]).sum()) if len(values) and values[0] > 0 else 0
     N = S[:, None] * right[rank:].T  # (1)
     K_N, M_N = symmetric(N.T @ K @ N), symmetric(N.T @ M @ N)
-    require_held(where, K_N, N)
+    require_held(where, K_N)
     if rigid is None:
         T_0 = S[:, None] * la.lstsq(rows[:, None] * G * S, rows[:, None] * R, cond=RANK)[0]
         require_followed(where, G @ T_0, R)
@@ -100,7 +100,7 @@ def held_by_bases(where: str, M: Array, K: Array, G: Array, R: Array, scale: Arr
     return Held(T, V[:, is_massive], np.sqrt(omega2[is_massive]), V[:, static] / np.sqrt(omega2[static]))
 
 
-def require_held(where: str, K_N: Array, N: Array) -> None:
+def require_held(where: str, K_N: Array) -> None:
     """Raise `ModelError` if a motion with fixed bases has no energy."""
     if not len(K_N):
         return
