@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from cms.reduction.basis.frames import BuckensFrame, NodalFrame, TisserandFrame
 from fe_models.body.fe_body import Interface
 from fe_models.body.loads import gravity_load, interface_load
 from tests.bodies import STEEL, box_mesh, distorted
@@ -26,6 +27,16 @@ def hinged_bricks():
 
 
 TURNED = ((0.0, 1.0, 0.0), (-0.6, 0.0, 0.8), (0.8, 0.0, 0.6))
+FRAMES = {
+    "tisserand": TisserandFrame(),
+    "tisserand turned": TisserandFrame(origin=(0.2, -0.1, 0.3), axes=TURNED),
+    "buckens": BuckensFrame(),
+    "buckens turned": BuckensFrame(origin=(0.2, -0.1, 0.3), axes=TURNED),
+    "nodal left": NodalFrame("left"),
+    "nodal right": NodalFrame("right"),
+    "nodal right turned": NodalFrame("right", origin=(0.2, -0.1, 0.3), axes=TURNED),
+    "nodal": NodalFrame(),
+}
 
 
 def uneven_bar(kinds=("rigid", "distributing")):

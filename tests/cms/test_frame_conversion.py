@@ -17,20 +17,12 @@ from cms.reduction.frame_conversion import convert_frame
 from fe_models.body.couplings.couplings import couple
 from fe_models.body.fe_body import FEBody, Interface
 from tests.bodies import bar, beam, chain, with_interfaces
+from tests.cms.examples import FRAMES as OF_FRAMES
 from tests.cms.examples import TURNED, uneven_bar
 from tests.root import ROOT
 from tests.synthetic import synthetic_reduced_body
 
-FRAMES = {
-    "tisserand": TisserandFrame(),
-    "tisserand turned": TisserandFrame(origin=(0.2, -0.1, 0.3), axes=TURNED),
-    "buckens": BuckensFrame(),
-    "buckens turned": BuckensFrame(origin=(0.2, -0.1, 0.3), axes=TURNED),
-    "nodal left": NodalFrame("left"),
-    "nodal right": NodalFrame("right"),
-    "nodal right turned": NodalFrame("right", axes=TURNED),
-    "nodal": NodalFrame(),
-}
+FRAMES = OF_FRAMES | {"nodal right turned": NodalFrame("right", axes=TURNED)}
 SLACK = 1e-8  #: roundoff times the condition of M in another frame, relative to the largest entry
 
 

@@ -7,7 +7,6 @@ import pytest
 import scipy.linalg as la
 import scipy.sparse as sp
 from numpy.testing import assert_allclose
-from typer.testing import CliRunner
 
 import cms
 import floatframe as ff
@@ -17,7 +16,6 @@ from cms.assessment.quality.of_body.effective_mass import effective_mass
 from cms.assessment.quality.reduction_check import check_reduction
 from cms.assessment.quality.reference.port_model import frf
 from cms.body.modal_file.file import read_sealed
-from cms.cli.app import app
 from cms.errors import BodyError
 from cms.reduction.basis.frames import HeldFrame, TisserandFrame
 from fe_models.files.matrices.given import body_from_matrices
@@ -25,6 +23,7 @@ from fe_models.foundation.units import unit_system
 from fe_models.meshes.numbering import Numbering
 from floatframe.errors import ModelError
 from tests.bodies import STEEL, bar
+from tests.cms.command import run_cms
 
 SI = unit_system("m-kg-s")
 
@@ -143,19 +142,19 @@ def test_a_job_says_that_its_matrices_are_held(tmp_path):
     np.savez(tmp_path / "bar.npz", **arrays)
     job = '[body]\nmatrices = "bar.npz"\nunits = "m-kg-s"\n{}[reduction]\nset = "rubin"\nn_modes = 4\n{}'
     (tmp_path / "bar.toml").write_text(job.format("", ""))
-    run = CliRunner().invoke(app, ["reduce", str(tmp_path / "bar.toml")])
+    run = run_cms("reduce", tmp_path / "bar.toml")
     assert run.exit_code == 2
     assert "say so: held = true in the [body] of a job" in run.stderr
     (tmp_path / "bar.toml").write_text(job.format("held = true\n", 'frame = "tisserand"\n'))
-    run = CliRunner().invoke(app, ["reduce", str(tmp_path / "bar.toml")])
+    run = run_cms("reduce", tmp_path / "bar.toml")
     assert "its frame is the ground: remove frame" in run.stderr
     (tmp_path / "bar.toml").write_text(job.format("held = true\n", ""))
-    run = CliRunner().invoke(app, ["reduce", str(tmp_path / "bar.toml")])
+    run = run_cms("reduce", tmp_path / "bar.toml")
     assert run.exit_code == 0, run.stderr
     assert "no floating frame can take it" in run.stdout
-    told = CliRunner().invoke(app, ["info", str(tmp_path / "bar.h5")]).output
+    told = run_cms("info", tmp_path / "bar.h5").output
     assert "Frequencies as held" in told
     assert "Free-free" not in told
-    run = CliRunner().invoke(app, ["check", str(tmp_path / "bar.h5"), "--job", str(tmp_path / "bar.toml")])
+    run = run_cms("check", tmp_path / "bar.h5", "--job", tmp_path / "bar.toml")
     assert run.exit_code == 0, run.stdout
     assert [record.name for record in check_body(cms.read(tmp_path / "bar.h5")) if record.verdict == "fail"] == []

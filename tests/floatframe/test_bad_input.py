@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from floatframe import (
     GROUND,
@@ -20,12 +19,12 @@ from floatframe import (
     integrate,
 )
 from floatframe.analyses import consistent_state
-from floatframe.cli.app import app
 from floatframe.components.mechanisms import slider_crank
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import ConvergenceError, ModelError
 from floatframe.model.functions.time_functions import polynomial_of_time
 from floatframe.simulation.step_advice import step_advice
+from tests.floatframe.command import run_floatframe
 from tests.floatframe.examples import CRANK, TURN, parallelogram
 from tests.floatframe.point_masses import random_point_masses, reduced_body
 
@@ -35,7 +34,7 @@ PUSH = '\n[joints.guide.motions.distance]\ntype = "polynomial"\ncoefficients = [
 def refused(folder, text, command="run"):
     """Run the command on a file that it must refuse; return the message."""
     (folder / "crank.toml").write_text(text)
-    result = CliRunner().invoke(app, [command, str(folder / "crank.toml")])
+    result = run_floatframe(command, folder / "crank.toml")
     assert result.exit_code == 2, result.output
     errors = [line for line in result.stderr.splitlines() if line.startswith("error: ")]
     assert len(errors) == 1
@@ -99,7 +98,7 @@ def test_a_drive_past_the_reach_of_the_mechanism_tells_time_joint_and_advice_and
         assert words in message
     assert (tmp_path / "crank.h5.segments").is_dir()
     for command in ("plot", "info"):
-        result = CliRunner().invoke(app, [command, str(tmp_path / "crank.h5.segments")])
+        result = run_floatframe(command, tmp_path / "crank.h5.segments")
         assert result.exit_code == 0
     assert "did not reach its end" in result.stdout
 
@@ -113,7 +112,7 @@ def test_a_singular_position_at_the_start_is_told_from_redundant_joints():
 def test_gravity_of_another_unit_system_is_noted(tmp_path, caplog):
     path = tmp_path / "crank.toml"
     path.write_text(CRANK.replace('"m-kg-s"', '"mm-t-s"').replace("t_end = 0.5", "t_end = 1e-3"))
-    CliRunner().invoke(app, ["run", str(path)])
+    run_floatframe("run", path)
     assert "gravity is 9.81 mm/s², but on earth 9806.65: is it in other units?" in caplog.text
 
 
@@ -121,11 +120,11 @@ def test_inertia_of_a_giant_is_noted(tmp_path, caplog):
     path = tmp_path / "crank.toml"
     path.write_text(CRANK.replace("inertia = [[1e-3, 0, 0], [0, 0.03, 0], [0, 0, 0.03]]",
                                   "inertia = [[1e4, 0, 0], [0, 3e5, 0], [0, 0, 3e5]]"))  # fmt: skip
-    CliRunner().invoke(app, ["check", str(path)])
+    run_floatframe("check", path)
     assert "rigid body 'rod' has mass and inertia of a part with a radius of gyration of 548 m" in caplog.text
     caplog.clear()
     path.write_text(CRANK)
-    CliRunner().invoke(app, ["check", str(path)])
+    run_floatframe("check", path)
     assert not caplog.text
 
 

@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.special import ellipk
-from typer.testing import CliRunner
 
 import cms
 import fe_models
 import floatframe as ff
-from cms.cli.app import app
 from fe_models.parts import shipped_mesh
 from floatframe.results.trajectory import BodyMotion
+from tests.cms.command import run_cms
 from tests.docs.tutorials import PAGES, blocks
 from tests.root import ROOT
 
@@ -130,7 +129,7 @@ def test_job_of_the_readme_gives_the_body_of_its_python_example(tmp_path, reduce
     block = re.search(r"```toml\n(\[body\].*?)```", README.read_text(), re.DOTALL).group(1)
     (tmp_path / "rod.msh").write_bytes(shipped_mesh("connecting_rod").read_bytes())
     (tmp_path / "rod.toml").write_text(block.replace("n_modes = 12", "n_modes = 4"))
-    result = CliRunner().invoke(app, ["reduce", str(tmp_path / "rod.toml"), "-o", str(tmp_path / "rod.h5")])
+    result = run_cms("reduce", tmp_path / "rod.toml", "-o", tmp_path / "rod.h5")
     assert result.exit_code == 0, result.output
     from_job = cms.read(tmp_path / "rod.h5")
     assert_allclose(from_job.frequencies, reduced.frequencies, rtol=1e-10)

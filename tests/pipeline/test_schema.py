@@ -11,6 +11,7 @@ from cms.cli.app import app as cms_app
 from fe_models.foundation.file_kinds import KINDS
 from floatframe.cli.app import app
 from floatframe.machines.catalogue import copy_machine
+from tests.floatframe.command import run_floatframe
 from tests.root import ROOT
 
 SHIPPED = sorted(path for room in ("cms", "floatframe") for path in (ROOT / room).rglob("*.toml"))
@@ -109,6 +110,6 @@ def test_an_entry_of_a_list_may_be_an_expression_but_no_empty_table(schemas, ent
 
 
 def test_an_unknown_kind_is_refused_with_the_nearest():
-    result = CliRunner().invoke(app, ["schema", "sytem"])
+    result = run_floatframe("schema", "sytem")
     assert result.exit_code == 2
     assert "did you mean 'system'?" in result.stderr

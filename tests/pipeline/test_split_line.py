@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 from numpy.testing import assert_allclose
-from typer.testing import CliRunner
 
 import cms
-from cms.cli.app import app
 from cms.cli.split import SplitRequest, split_job
 from cms.errors import CmsError, JobError
 from cms.jobs.body_of_job import job_body
@@ -22,6 +20,7 @@ from floatframe import GeneralizedAlpha, integrate, linearize, static_equilibriu
 from floatframe.files.system_file.read_system import read_system
 from floatframe.results.place_motion import interface_motion
 from tests.bodies import box_mesh
+from tests.cms.command import run_cms
 from tests.decks import write_deck
 
 BEAM = """
@@ -476,9 +475,7 @@ def test_a_part_that_cannot_be_is_named(beam, part, message):
 
 def test_command_splits_reduces_and_says_where(beam):
     job = beam(n_modes=2, bob=4)
-    result = CliRunner().invoke(
-        app, ["split", str(job), "--at", "0.75", "--axis", "x", "-o", str(job.with_name("two")), "--reduce"]
-    )
+    result = run_cms("split", job, "--at", "0.75", "--axis", "x", "-o", job.with_name("two"), "--reduce")
     assert result.exit_code == 0, result.output
     for name in ("part_1.toml", "part_2.toml", "system.toml", "part_1.h5", "part_2.h5"):
         assert job.with_name("two").joinpath(name).is_file()
@@ -499,7 +496,7 @@ def test_command_splits_reduces_and_says_where(beam):
 def test_command_names_the_option_that_is_wrong(beam, arguments, message, monkeypatch):
     job = beam()
     monkeypatch.chdir(job.parent)
-    result = CliRunner().invoke(app, ["split", str(job), *arguments])
+    result = run_cms("split", job, *arguments)
     assert result.exit_code == 2
     assert message in " ".join(result.output.split())
 

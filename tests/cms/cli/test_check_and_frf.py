@@ -5,18 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from typer.testing import CliRunner
 
 from cms.assessment.quality.errors import QualityError
 from cms.assessment.quality.of_reduction.frf import resonance_grid
 from cms.assessment.quality.reference.port_model import file_resonances, frf
 from cms.body.modal_file.file import read, write
-from cms.cli.app import app
 from cms.cli.frf import parse_band, parse_component
 from cms.jobs.job import read_job
 from cms.pipeline import reduce_job
 from fe_models.files import read_table
 from tests.bodies import box_mesh
+from tests.cms.command import run_cms
 from tests.decks import JOB, write_deck
 
 FRF = ("--from", "left", "--to", "right", "--band", "100:30000:60")
@@ -41,10 +40,6 @@ def folder(tmp_path_factory):
     return folder
 
 
-def run(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments])
-
-
 def assert_refused(result, *words):
     assert result.exit_code == 2, result.output
     assert result.stderr.count("error: ") == 1
@@ -54,7 +49,7 @@ def assert_refused(result, *words):
 
 
 def test_a_good_file_passes_with_exit_code_0(folder):
-    result = run("check", folder / "bar.h5")
+    result = run_cms("check", folder / "bar.h5")
     assert result.exit_code == 0, result.output
     for word in ("free-frequencies", "Quality of bar", "tolerance", "pass"):
         assert word in result.stdout
@@ -63,14 +58,14 @@ def test_a_good_file_passes_with_exit_code_0(folder):
 
 
 def test_a_wrong_sign_in_the_file_fails_with_exit_code_1(folder):
-    result = run("check", folder / "wrong.h5")
+    result = run_cms("check", folder / "wrong.h5")
     assert result.exit_code == 1
     assert "a mass moment has a wrong sign" in result.stdout
     assert "bar fails: " in result.stdout
 
 
 def test_the_json_of_a_check_is_its_records(folder):
-    result = run("check", folder / "wrong.h5", "--json")
+    result = run_cms("check", folder / "wrong.h5", "--json")
     assert result.exit_code == 1
     told = json.loads(result.stdout)
     assert (told["body"], told["verdict"]) == ("bar", "fail")
@@ -83,7 +78,7 @@ def test_the_json_of_a_check_is_its_records(folder):
 def test_with_its_job_a_file_is_compared_with_the_full_model(folder):
     """The job of the poor file with the number of modes of the good one is the job of the good one."""
     job = folder / "poor.toml", "--set", "reduction.n_modes=12"
-    result = run("check", folder / "bar.h5", "--job", *job, "--json", "--band", "10000")
+    result = run_cms("check", folder / "bar.h5", "--job", *job, "--json", "--band", "10000")
     told = {record["name"]: record for record in json.loads(result.stdout)["records"]}
     assert result.exit_code == 0, told
     assert told["frequency-error"]["data"]["band_hz"] == 10000
@@ -92,7 +87,7 @@ def test_with_its_job_a_file_is_compared_with_the_full_model(folder):
 
 
 def test_the_file_of_another_job_fails(folder):
-    result = run("check", folder / "poor.h5", "--job", folder / "bar.toml", "--json")
+    result = run_cms("check", folder / "poor.h5", "--job", folder / "bar.toml", "--json")
     assert result.exit_code == 1
     told = {record["name"]: record for record in json.loads(result.stdout)["records"]}
     assert told["same-body"]["verdict"] == "fail"
@@ -132,13 +127,13 @@ def test_the_file_of_another_job_fails(folder):
 def test_bad_input_is_refused_in_one_message(folder, monkeypatch, arguments, words):
     monkeypatch.chdir(folder)
     before = sorted(p.name for p in folder.iterdir())
-    assert_refused(run(*arguments), *words)
+    assert_refused(run_cms(*arguments), *words)
     assert sorted(p.name for p in folder.iterdir()) == before
 
 
 def test_the_table_of_a_response_is_that_of_the_function(folder, tmp_path):
     path = tmp_path / "frf.csv"
-    result = run("frf", folder / "bar.h5", *FRF, "-c", "uz", "-c", "rz/uy", "--inertance", "-o", path)
+    result = run_cms("frf", folder / "bar.h5", *FRF, "-c", "uz", "-c", "rz/uy", "--inertance", "-o", path)
     assert result.exit_code == 0, result.output
     with path.open() as stream:
         rows = list(csv.reader(stream))
@@ -160,7 +155,7 @@ def test_the_table_of_a_response_is_that_of_the_function(folder, tmp_path):
 
 def test_the_full_model_is_drawn_over_the_reduced_one(folder, tmp_path):
     picture, table = tmp_path / "frf.png", tmp_path / "frf.csv"
-    result = run("frf", folder / "bar.h5", *FRF, "--job", folder / "bar.toml", "-o", picture, "-o", table)
+    result = run_cms("frf", folder / "bar.h5", *FRF, "--job", folder / "bar.toml", "-o", picture, "-o", table)
     assert result.exit_code == 0, result.output
     assert "Against the full model: below 5 % up to" in result.stdout
     assert "1 % in every free-free mode" in result.stdout

@@ -33,6 +33,7 @@ from fe_models.foundation.documents.document import Answer, Document
 from fe_models.foundation.extras import MissingExtraError
 from floatframe.cli.app import app as floatframe_app
 from tests.bodies import box_mesh
+from tests.cms.command import assert_refused, run_cms
 from tests.decks import JOB, write_deck
 from tests.root import ROOT, heed_signals
 from tests.synthetic import synthetic_reduced_body
@@ -60,29 +61,15 @@ def modal_file(tmp_path_factory) -> Path:
     return path
 
 
-def run(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments])
-
-
 def contents(folder: Path) -> dict[str, bytes]:
     return {p.name: p.read_bytes() for p in sorted(folder.iterdir())}
-
-
-def assert_refused(result, *words):
-    """Exit code 2, one message on standard error with these words, no traceback."""
-    assert result.exit_code == 2, result.output
-    assert result.stderr.startswith("error: ")
-    assert result.stderr.count("error: ") == 1
-    assert "Traceback" not in result.output
-    for word in words:
-        assert word in result.stderr
 
 
 # Good input ----------------------------------------------------------------------------------------------------------
 
 
 def test_reduce_writes_the_body_that_the_job_describes(folder):
-    result = run("reduce", folder / "bar.toml", "-o", folder / "out.h5")
+    result = run_cms("reduce", folder / "bar.toml", "-o", folder / "out.h5")
     assert result.exit_code == 0, result.output
     body = read(folder / "out.h5")
     assert_allclose(body.moments.m, 7.85e-9 * 100 * 10 * 10, rtol=1e-12)
@@ -97,7 +84,7 @@ def test_reduce_writes_the_body_that_the_job_describes(folder):
 
 
 def test_the_default_output_stands_beside_the_job(folder):
-    assert run("reduce", folder / "bar.toml").exit_code == 0
+    assert run_cms("reduce", folder / "bar.toml").exit_code == 0
     assert (folder / "bar.h5").is_file()
 
 
@@ -111,7 +98,7 @@ def test_file_line_and_memory_line_agree_bit_for_bit(folder):
 
 def test_reduce_takes_the_fewest_modes_for_an_error(folder):
     """And states the errors of what it made; the table of the job has a number of modes, which gives way."""
-    result = run("reduce", folder / "bar.toml", "-o", folder / "few.h5", "--error", "1e-2", "--up-to", "20kHz")
+    result = run_cms("reduce", folder / "bar.toml", "-o", folder / "few.h5", "--error", "1e-2", "--up-to", "20kHz")
     assert result.exit_code == 0, result.output
     told = " ".join(result.stdout.split())
     assert (
@@ -120,7 +107,7 @@ def test_reduce_takes_the_fewest_modes_for_an_error(folder):
     assert "estimated errors by the reduction" in told
     made = read(folder / "few.h5")
     assert 0 < made.errors.frequency[made.free_frequencies[: len(made.errors.frequency)] < 20e3].max() <= 0.005
-    record = json.loads(run("info", folder / "few.h5", "--json").stdout)["errors"]
+    record = json.loads(run_cms("info", folder / "few.h5", "--json").stdout)["errors"]
     assert_allclose(record["frequency"], made.errors.frequency)
     assert record["method"] == made.errors.method
 
@@ -135,7 +122,7 @@ def test_reduce_takes_the_fewest_modes_for_an_error(folder):
     ],
 )
 def test_an_error_that_cannot_be_met_is_refused(folder, words, message):
-    assert_refused(run("reduce", folder / "bar.toml", "-o", folder / "x.h5", *words), message)
+    assert_refused(run_cms("reduce", folder / "bar.toml", "-o", folder / "x.h5", *words), message)
     assert not (folder / "x.h5").exists()
 
 
@@ -143,11 +130,11 @@ def test_reduce_warns_of_a_body_too_large_once_and_info_again(folder, caplog):
     """The bar is 100 mm long; its numbers read as metres make a body of 101 m of steel."""
     text = JOB.replace("mm-t-s", "m-kg-s").replace("210000", "2.1e11").replace("7.85e-9", "7850.0")
     (folder / "bar.toml").write_text(text)
-    result = run("reduce", folder / "bar.toml")
+    result = run_cms("reduce", folder / "bar.toml")
     assert result.exit_code == 0, result.output
     assert caplog.text.count("the body is 101 m large") == 1  # a note on standard error
     assert "large" not in result.stdout
-    assert run("info", folder / "bar.h5").stdout.count("the body is 101 m large") == 1
+    assert run_cms("info", folder / "bar.h5").stdout.count("the body is 101 m large") == 1
 
 
 def test_cutoff_is_in_hertz_in_every_unit_system(folder):
@@ -198,12 +185,12 @@ def test_matrices_reduce_without_a_mesh(folder):
         **{f"interface/{i.name}/nodes": i.nodes for i in body.interfaces},
     )
     (folder / "bar.toml").write_text('[body]\nmatrices = "bar.npz"\nunits = "m-kg-s"\n[reduction]\nn_modes = 2\n')
-    result = run("reduce", folder / "bar.toml")
+    result = run_cms("reduce", folder / "bar.toml")
     assert result.exit_code == 0, result.output
     assert_allclose(read(folder / "bar.h5").moments.m, 7850 * 0.05 * 0.04, rtol=1e-12)
     assert read(folder / "bar.h5").geometric is None
     (folder / "bar.toml").write_text((folder / "bar.toml").read_text() + "geometric_stiffness = true\n")
-    result = run("reduce", folder / "bar.toml", "-o", folder / "other.h5")
+    result = run_cms("reduce", folder / "bar.toml", "-o", folder / "other.h5")
     assert_refused(result, "geometric stiffness needs the elements", "geometric_stiffness = false")
 
 
@@ -224,7 +211,7 @@ def test_a_job_leaves_the_loads_out_that_lead_to_a_buckens_frame(folder):
     assert_allclose(without.interfaces, with_them.interfaces, rtol=0, atol=1e-9 * np.abs(with_them.interfaces).max())
     both = "[reduction]\nspread_loads = true\ngeometric_stiffness = false"
     (folder / "bar.toml").write_text(JOB.replace("[reduction]", both))
-    assert_refused(run("reduce", folder / "bar.toml"), "spread_loads = true belongs to the geometric stiffness")
+    assert_refused(run_cms("reduce", folder / "bar.toml"), "spread_loads = true belongs to the geometric stiffness")
 
 
 LOADS = """
@@ -254,7 +241,7 @@ axes = [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]
 def test_reduce_keeps_the_load_cases_of_the_job_with_their_resultants(folder):
     """Bar 100 x 10 x 10 mm, B at the middle of the left end with turned axes: x of B is y of the mesh."""
     (folder / "bar.toml").write_text(JOB.replace("[reduction]\n", LOADS).replace("ratio = 0.01", "ramp = true"))
-    result = run("reduce", folder / "bar.toml", "-o", folder / "out.h5")
+    result = run_cms("reduce", folder / "bar.toml", "-o", folder / "out.h5")
     assert result.exit_code == 0, result.output
     body = read(folder / "out.h5")
     assert body.stress is None
@@ -276,7 +263,7 @@ def test_reduce_keeps_the_load_cases_of_the_job_with_their_resultants(folder):
 
 
 def test_info_prints_what_is_in_the_file(modal_file):
-    result = run("info", modal_file)
+    result = run_cms("info", modal_file)
     assert result.exit_code == 0, result.output
     for word in ("synthetic", "mm-t-s", "nodal at big_end", "kleines Auge/2 µ", "fixed-interface", "rod.msh", "digest",
                  "Zünden/1", "pressure", "torque about the origin", "at the kept nodes and at 2 points"):  # fmt: skip
@@ -284,28 +271,28 @@ def test_info_prints_what_is_in_the_file(modal_file):
 
 
 def test_info_in_other_units(modal_file):
-    result = run("info", modal_file, "--units", "m-kg-s")
+    result = run_cms("info", modal_file, "--units", "m-kg-s")
     assert result.exit_code == 0, result.output
     body = synthetic_reduced_body()
     for word in ("m-kg-s", f"{body.moments.m * 1000:.6g} kg", "units converted from"):
         assert word in result.stdout
-    record = json.loads(run("info", modal_file, "--units", "m-kg-s", "--json").stdout)
+    record = json.loads(run_cms("info", modal_file, "--units", "m-kg-s", "--json").stdout)
     assert_allclose(record["load_cases"][0]["force"], body.load_cases[0].force, rtol=1e-14)  # mm t/s² are newtons too
     assert_allclose(record["load_cases"][0]["torque"], body.load_cases[0].torque / 1000, rtol=1e-14)
-    assert_refused(run("info", modal_file, "--units", "m-kg"), "did you mean 'm-kg-s'?")
+    assert_refused(run_cms("info", modal_file, "--units", "m-kg"), "did you mean 'm-kg-s'?")
 
 
 def test_frame_writes_the_body_in_the_other_frame(modal_file, tmp_path):
     path = tmp_path / "rod.h5"
     path.write_bytes(modal_file.read_bytes())
-    result = run("frame", path, "--to", "tisserand")
+    result = run_cms("frame", path, "--to", "tisserand")
     assert result.exit_code == 0, result.output
     assert "tisserand" in result.stdout
     expected = convert_frame(read(path), TisserandFrame())
     written = read(tmp_path / "rod_tisserand.h5")
     assert_allclose(written.Phi, expected.Phi, rtol=0, atol=0)
     options = ["--origin", "1,2,3", "--axes", "0,1,0;-1,0,0;0,0,1", "--damping", "0.03", "--units", "m-kg-s"]
-    result = run("frame", path, "--to", "buckens", *options, "-o", tmp_path / "b.h5")
+    result = run_cms("frame", path, "--to", "buckens", *options, "-o", tmp_path / "b.h5")
     assert result.exit_code == 0, result.output
     assert "x axis of B" in result.stdout
     body = read(tmp_path / "b.h5")
@@ -332,19 +319,19 @@ def test_frame_refuses_what_it_cannot_do(modal_file, tmp_path):
         (("--to", "buckens", "--units", "m-kg"), "did you mean 'm-kg-s'?"),
         (("--to", "buckens", "-o", path), "this is an input; choose another name"),
     ]:
-        assert_refused(run("frame", path, *options), words)
+        assert_refused(run_cms("frame", path, *options), words)
         assert contents(tmp_path) == before
 
 
 def test_frame_takes_a_damping_ratio_above_a_fifth_if_it_is_confirmed(modal_file, tmp_path):
-    result = run("frame", modal_file, "--to", "buckens", "--damping", "0.3", "--heavy", "-o", tmp_path / "b.h5")
+    result = run_cms("frame", modal_file, "--to", "buckens", "--damping", "0.3", "--heavy", "-o", tmp_path / "b.h5")
     assert result.exit_code == 0, result.output
     body = read(tmp_path / "b.h5")
     assert_allclose(np.diag(body.D), 2 * 0.3 * np.sqrt(np.diag(body.K)), rtol=1e-12)
 
 
 def test_info_json_is_the_record(modal_file):
-    result = run("info", modal_file, "--json")
+    result = run_cms("info", modal_file, "--json")
     assert result.exit_code == 0
     record = json.loads(result.stdout)
     body = synthetic_reduced_body()
@@ -357,7 +344,7 @@ def test_info_json_is_the_record(modal_file):
 def test_view_draws_a_picture_beside_the_modal_file(modal_file, tmp_path):
     path = tmp_path / "bar.h5"
     path.write_bytes(modal_file.read_bytes())
-    result = run("view", path, "--mode", "2")
+    result = run_cms("view", path, "--mode", "2")
     assert result.exit_code == 0, result.output
     assert sorted(contents(tmp_path)) == ["bar.h5", "bar_mode2.png"]
     assert (tmp_path / "bar_mode2.png").read_bytes().startswith(b"\x89PNG")
@@ -373,9 +360,9 @@ def test_view_draws_films_and_pictures_where_it_is_told(modal_file, tmp_path, mo
 
     monkeypatch.setattr("cms.assessment.report.view.view_mode", recorded("picture"))
     monkeypatch.setattr("cms.assessment.report.view.animate_mode", recorded("film"))
-    assert run("view", modal_file, "-m", "3", "-a", tmp_path / "m.gif", "--scale", "0.2").exit_code == 0
+    assert run_cms("view", modal_file, "-m", "3", "-a", tmp_path / "m.gif", "--scale", "0.2").exit_code == 0
     assert calls == [("film", 3, 0.2)]
-    assert run("view", modal_file, "-a", tmp_path / "m.gif", "-o", tmp_path / "m.png").exit_code == 0
+    assert run_cms("view", modal_file, "-a", tmp_path / "m.gif", "-o", tmp_path / "m.png").exit_code == 0
     assert calls[1:] == [("picture", 1, None), ("film", 1, None)]
     assert sorted(contents(tmp_path)) == ["m.gif", "m.png"]
 
@@ -433,7 +420,7 @@ def test_the_demo_as_a_user_starts_it_draws_all_its_pictures(tmp_path, monkeypat
 def assert_demo_makes_its_files(tmp_path, monkeypatch):
     """Run the demo and return its files by name; raise `AssertionError` if a command or a file is missing."""
     monkeypatch.chdir(tmp_path)
-    result = run("demo")
+    result = run_cms("demo")
     assert result.exit_code == 0, result.output
     files = contents(tmp_path / "demo")
     for name in ("rod.h5", "m3.png", "m3.gif", "crank.h5", "crank.png", "crank.mp4"):
@@ -448,7 +435,7 @@ def assert_demo_makes_its_files(tmp_path, monkeypatch):
 def test_the_demo_needs_a_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "demo").write_text("a file")
-    assert_refused(run("demo"), "demo: cannot be made")
+    assert_refused(run_cms("demo"), "demo: cannot be made")
     assert contents(tmp_path) == {"demo": b"a file"}
 
 
@@ -478,7 +465,7 @@ def test_a_bad_job_ends_in_one_message_and_leaves_nothing(folder, old, new, word
     assert JOB.count(old) == 1
     (folder / "bar.toml").write_text(JOB.replace(old, new))
     before = contents(folder)
-    assert_refused(run("reduce", folder / "bar.toml"), *words)
+    assert_refused(run_cms("reduce", folder / "bar.toml"), *words)
     assert contents(folder) == before
 
 
@@ -508,7 +495,7 @@ def test_a_bad_mesh_ends_in_one_message_and_leaves_nothing(folder, kind):
     arrays, words = bad_meshes()[kind]
     write_deck(folder / "bar.inp", Mesh(**arrays))
     before = contents(folder)
-    result = run("reduce", folder / "bar.toml")
+    result = run_cms("reduce", folder / "bar.toml")
     assert_refused(result)
     assert all(word in result.stderr.lower() for word in words), result.stderr
     assert contents(folder) == before
@@ -523,7 +510,7 @@ def test_matrices_with_nan_are_refused(folder):
     np.savez(folder / "bar.npz", M=body.M.toarray(), K=K, nodes=body.nodes, dofs=body.dofs)
     (folder / "bar.toml").write_text('[body]\nmatrices = "bar.npz"\nunits = "m-kg-s"\n[reduction]\nn_modes = 2\n')
     before = contents(folder)
-    assert_refused(run("reduce", folder / "bar.toml"), "K: expected finite numbers")
+    assert_refused(run_cms("reduce", folder / "bar.toml"), "K: expected finite numbers")
     assert contents(folder) == before
 
 
@@ -534,7 +521,7 @@ def test_a_mesh_that_is_no_mesh_is_refused(folder, content, suffix):
     (folder / f"garbage{suffix}").write_bytes(content)
     (folder / "bar.toml").write_text(JOB.replace("bar.inp", f"garbage{suffix}"))
     before = contents(folder)
-    assert_refused(run("reduce", folder / "bar.toml"), f"garbage{suffix}")
+    assert_refused(run_cms("reduce", folder / "bar.toml"), f"garbage{suffix}")
     assert contents(folder) == before
 
 
@@ -553,7 +540,7 @@ def test_a_mechanism_is_named(folder):
     job = re.sub(r"\[interfaces.right\].*?\n\n", "", JOB, flags=re.DOTALL).replace("n_modes = 3", 'set = "guyan"')
     (folder / "bar.toml").write_text(job)
     before = contents(folder)
-    assert_refused(run("reduce", folder / "bar.toml"), "1 motions without energy", "at (20, 20, 0)")
+    assert_refused(run_cms("reduce", folder / "bar.toml"), "1 motions without energy", "at (20, 20, 0)")
     assert contents(folder) == before
 
 
@@ -571,7 +558,7 @@ def test_a_mechanism_is_named(folder):
 def test_a_damaged_modal_file_is_refused(modal_file, tmp_path, damage, words, command):
     path = tmp_path / "bad.h5"
     path.write_bytes(damage(modal_file.read_bytes()))
-    result = run(command[0], path, *command[1:])
+    result = run_cms(command[0], path, *command[1:])
     assert_refused(result, words)
     assert result.stdout == ""
 
@@ -579,10 +566,10 @@ def test_a_damaged_modal_file_is_refused(modal_file, tmp_path, damage, words, co
 def test_other_and_newer_and_missing_files_are_refused(tmp_path, modal_file):
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["x"] = 1.0
-    assert_refused(run("info", tmp_path / "other.h5"), "HDF5 of another program")
+    assert_refused(run_cms("info", tmp_path / "other.h5"), "HDF5 of another program")
     write_sealed(Content("modal-file", VERSION + 1, {}), tmp_path / "new.h5")
-    assert_refused(run("info", tmp_path / "new.h5"), f"format version {VERSION + 1}", "update")
-    assert_refused(run("info", modal_file.with_name("baz.h5")), "did you mean 'bar.h5'?")
+    assert_refused(run_cms("info", tmp_path / "new.h5"), f"format version {VERSION + 1}", "update")
+    assert_refused(run_cms("info", modal_file.with_name("baz.h5")), "did you mean 'bar.h5'?")
 
 
 @pytest.mark.parametrize(("options", "words"), [
@@ -597,7 +584,7 @@ def test_other_and_newer_and_missing_files_are_refused(tmp_path, modal_file):
 def test_view_refuses_what_it_cannot_draw(modal_file, tmp_path, monkeypatch, options, words):
     (tmp_path / "bar.h5").write_bytes(modal_file.read_bytes())
     monkeypatch.chdir(tmp_path)
-    assert_refused(run("view", "bar.h5", *options), words)
+    assert_refused(run_cms("view", "bar.h5", *options), words)
     assert sorted(contents(tmp_path)) == ["bar.h5"]
 
 
@@ -609,7 +596,7 @@ def test_the_output_is_checked_before_the_work(folder):
         ("bar.inp", "this is an input; choose another name"),
         (".", "this is a folder"),
     ]:
-        assert_refused(run("reduce", folder / "bar.toml", "-o", folder / output), words)
+        assert_refused(run_cms("reduce", folder / "bar.toml", "-o", folder / output), words)
     assert contents(folder) == before
 
 
@@ -618,11 +605,11 @@ def test_a_fault_of_the_program_has_exit_code_1_and_a_traceback_only_with_debug(
         raise ZeroDivisionError("unlucky")
 
     monkeypatch.setattr("cms.pipeline.reduce_job", fail)
-    result = run("reduce", folder / "bar.toml")
+    result = run_cms("reduce", folder / "bar.toml")
     assert result.exit_code == 1
     assert "ZeroDivisionError: unlucky" in result.stderr
     assert "Traceback" not in result.output
-    assert "Traceback" in run("--debug", "reduce", folder / "bar.toml").stderr
+    assert "Traceback" in run_cms("--debug", "reduce", folder / "bar.toml").stderr
     assert sorted(contents(folder)) == ["bar.inp", "bar.toml"]
 
 
@@ -631,7 +618,7 @@ def test_an_interrupt_has_exit_code_130(folder, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("cms.pipeline.reduce_job", fail)
-    result = run("reduce", folder / "bar.toml")
+    result = run_cms("reduce", folder / "bar.toml")
     assert result.exit_code == 130
     assert result.stderr.startswith("error: interrupted")
 
@@ -682,7 +669,7 @@ def test_a_killed_run_leaves_the_old_file(folder):
 
 def test_a_paragraph_of_help_fills_its_lines():
     """Line breaks of a docstring are not those of the terminal."""
-    told = CliRunner().invoke(app, ["reduce", "--help"], env={"COLUMNS": "200"}).stdout
+    told = run_cms("reduce", "--help", env={"COLUMNS": "200"}).stdout
     assert "With several jobs or --workers, each job is a task; finished jobs are recorded" in told
 
 
@@ -706,11 +693,11 @@ def test_output_survives_a_terminal_without_unicode(modal_file):
 
 
 def test_version_and_unknown_commands():
-    assert run("--version").stdout.startswith("cms ")
-    result = run("reduse")
+    assert run_cms("--version").stdout.startswith("cms ")
+    result = run_cms("reduse")
     assert result.exit_code == 2
     assert "reduse" in result.stderr
-    assert run().exit_code in (0, 2)
+    assert run_cms().exit_code in (0, 2)
 
 
 @pytest.mark.parametrize(("ending", "library"), [(".parquet", "pyarrow"), (".pdf", "reportlab")])

@@ -2,10 +2,9 @@ import json
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from cms.assessment.report.face_view import visible_points
-from cms.cli.app import app
+from tests.cms.command import run_cms
 from tests.fe_models.small_solids import in_unit, painted, plate_file
 
 
@@ -15,7 +14,7 @@ def plate(tmp_path):
 
 
 def run(*words):
-    return CliRunner().invoke(app, ["faces", *map(str, words)])
+    return run_cms("faces", *words)
 
 
 def test_faces_are_listed_with_what_selects_them(plate):

@@ -5,9 +5,7 @@ import json
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from typer.testing import CliRunner
 
-from cms.cli.app import app
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
 from cms.jobs.mode_set_of_job import job_mode_set
@@ -15,6 +13,7 @@ from cms.modes.families.interface_loads import condensed_load, point_load
 from cms.modes.mode_sets import benfield_hruda, craig_bampton
 from cms.pipeline import reduce_job
 from tests.bodies import box_mesh
+from tests.cms.command import run_cms
 from tests.decks import JOB, write_deck
 
 CLASSICAL = (
@@ -33,10 +32,6 @@ def folder(tmp_path):
 def with_reduction(folder, text):
     (folder / "bar.toml").write_text(JOB.replace("n_modes = 3", text))
     return folder / "bar.toml"
-
-
-def run(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments])
 
 
 @pytest.mark.parametrize("name", CLASSICAL)
@@ -79,7 +74,7 @@ def test_a_neighbour_of_a_job_is_condensed(folder):
     expected = benfield_hruda(body, n_modes=3, loads=[load])
     assert_allclose(job_mode_set(body, job.reduction).frequencies, expected.frequencies, rtol=1e-9)
     (folder / "neighbour.toml").write_text(JOB.replace('"mm-t-s"', '"mm-kg-s"\naccept = ["units"]'))
-    result = run("reduce", folder / "bar.toml")
+    result = run_cms("reduce", folder / "bar.toml")
     assert result.exit_code == 2
     assert "the neighbour is in units mm-kg-s, body 'bar' in mm-t-s" in " ".join(result.output.split())
 
@@ -95,14 +90,14 @@ def test_free_components_of_a_job_are_those_of_python(folder):
 
 def test_a_cutoff_below_the_first_mode_ends_in_one_message(folder):
     path = with_reduction(folder, 'set = "rubin"\ncutoff = 2.0')
-    result = run("reduce", path)
+    result = run_cms("reduce", path)
     assert result.exit_code == 2
     assert "cutoff = 2 lies below the first elastic free mode of body 'bar'" in " ".join(result.output.split())
     assert not (folder / "bar.h5").exists()
 
 
 def test_modes_lists_columns_shapes_order_and_frame_in_words(folder):
-    result = run("modes", with_reduction(folder, 'set = "craig-bampton-ir"\nn_modes = 3'))
+    result = run_cms("modes", with_reduction(folder, 'set = "craig-bampton-ir"\nn_modes = 3'))
     assert result.exit_code == 0, result.output
     for words in (
         "mode set craig-bampton-ir: 21 columns", "constraint left ux", "inertia-relief rz", "fixed-interface 3",
@@ -115,7 +110,7 @@ def test_modes_lists_columns_shapes_order_and_frame_in_words(folder):
 
 def test_modes_as_json_is_the_reduced_body(folder):
     path = with_reduction(folder, 'set = "rubin"\nn_modes = 2')
-    result = run("modes", path, "--json")
+    result = run_cms("modes", path, "--json")
     record = json.loads(result.stdout)
     reduced = reduce_job(read_job(path))
     assert_allclose([mode["frequency_hz"] for mode in record["modes"]], reduced.frequencies, rtol=1e-9)

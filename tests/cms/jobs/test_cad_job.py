@@ -8,6 +8,7 @@ from cms.jobs.body_of_job import job_body, uncoupled_body
 from cms.jobs.job import read_job
 from fe_models.errors import InterfaceError
 from fe_models.foundation.stages import Stages
+from tests.changed_file import changed_file
 from tests.fe_models.small_solids import PLATE_VOLUME, in_unit, plate_file
 
 JOB = """
@@ -48,12 +49,7 @@ def job_file(tmp_path):
     plate_file(tmp_path / "plate.step")
 
     def write(*changes):
-        text = JOB
-        for old, new in changes:
-            assert old in text
-            text = text.replace(old, new)
-        (tmp_path / "plate.toml").write_text(text)
-        return tmp_path / "plate.toml"
+        return changed_file(tmp_path / "plate.toml", JOB, *changes)
 
     return write
 

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.testing import assert_allclose
 
 from floatframe import (
     GROUND,
@@ -16,6 +17,7 @@ from floatframe import (
     State,
     System,
     UserForce,
+    static_equilibrium,
 )
 from floatframe.analyses import consistent_state, snapshot
 from floatframe.engine.compiling.system import compiled_system
@@ -189,3 +191,25 @@ def held(bar, *forces):
     joint = RevoluteJoint("hinge", GROUND, Marker("bar", root), axis=(0, 1, 0))
     stay = SpringDamper("stay", Marker(GROUND, position=(0.3, 0.2, 2.0)), Marker("bar", tip), 3e4, 20.0)
     return System([FlexibleBody("bar", bar)], [joint], [Gravity((0, 0, -9.81)), stay, *forces])
+
+
+def slope_at_once(linear):
+    """Return the slopes of outputs by inputs while positions and velocities stay."""
+    return linear.D + linear.L_acceleration @ np.linalg.solve(linear.M, linear.B)
+
+
+def assert_slopes(linear, changed, about, s, *, rtol, atol):
+    """Compare the slopes by one input, at once and in equilibrium, with differences of systems that have it."""
+    found = {True: [], False: []}
+    for size in (s, -s):
+        other = changed(size)
+        made = consistent_state(other, about.state, known=about.w)
+        found[True].append(values_of(other, made.state, made.u_dot, made.w, linear.outputs))
+        moved = static_equilibrium(other, about.state, tolerance=1e-12)
+        found[False].append(values_of(other, moved.state, moved.u_dot, moved.w, linear.outputs))
+    for is_at_once, slope in ((True, slope_at_once(linear)), (False, linear.response([0.0])[0].real)):
+        plus, minus = found[is_at_once]
+        difference = (plus - minus) / (2 * s)
+        scale = np.abs(difference).max()
+        assert_allclose(slope[:, 0], difference, rtol=rtol, atol=atol * scale)
+        assert scale > 1e-3

@@ -22,7 +22,7 @@ from floatframe import (
     linearize,
     static_equilibrium,
 )
-from floatframe.analyses import ForceInput, consistent_state
+from floatframe.analyses import ForceInput
 from floatframe.analyses.linear import force_inputs
 from floatframe.engine.compiling.callbacks.user_forces import C_FUNCTION
 from floatframe.errors import ModelError
@@ -30,7 +30,7 @@ from floatframe.forces import BodyLoad
 from floatframe.model.functions.time_functions import constant, harmonic
 from floatframe.sensors import RecoverySensor
 from tests.cms.reduction.geometric_stiffness.examples import bar_of_beams
-from tests.floatframe.analyses.examples import TURN, held, machine, sensors, values_of
+from tests.floatframe.analyses.examples import TURN, assert_slopes, held, machine, sensors, values_of
 
 CASE = ReducedLoadCase("wind", "nodal", np.array([0.3, -0.2, 0.5]), np.array([0.1, 0.2, -0.3]), np.arange(1.0, 4.0) / 5)
 
@@ -66,22 +66,8 @@ def rest():
 def test_an_amplitude_acts_at_once_and_in_equilibrium(rest, name):
     system, about = rest
     linear = linearize(system, about, inputs=[ForceInput(name, name)], outputs=sensors())
-    at_once = linear.D + linear.L_acceleration @ np.linalg.solve(linear.M, linear.B)
     assert linear.input_units == ("N m" if name == "drive" else "1",)
-    found = {True: [], False: []}
-    s = 5e-4
-    for size in (s, -s):
-        other = loaded(name, size)
-        made = consistent_state(other, about.state, known=about.w)
-        found[True].append(values_of(other, made.state, made.u_dot, made.w, linear.outputs))
-        moved = static_equilibrium(other, about.state, tolerance=1e-12)
-        found[False].append(values_of(other, moved.state, moved.u_dot, moved.w, linear.outputs))
-    for is_at_once, slope in ((True, at_once), (False, linear.response([0.0])[0].real)):
-        plus, minus = found[is_at_once]
-        difference = (plus - minus) / (2 * s)
-        scale = np.abs(difference).max()
-        assert_allclose(slope[:, 0], difference, rtol=5e-6, atol=2e-8 * scale)
-        assert scale > 1e-3
+    assert_slopes(linear, lambda size: loaded(name, size), about, 5e-4, rtol=5e-6, atol=2e-8)
 
 
 def test_the_static_part_of_a_load_case_is_fed_through():

@@ -10,7 +10,6 @@ import scipy.linalg as la
 from matplotlib.figure import Figure
 from numpy.testing import assert_allclose
 from scipy.io import loadmat
-from typer.testing import CliRunner
 
 from floatframe import (
     GROUND,
@@ -28,12 +27,12 @@ from floatframe import (
 )
 from floatframe.analyses import resolved_frequencies
 from floatframe.analyses.snapshot import snapshot
-from floatframe.cli.app import app
 from floatframe.errors import ModelError
 from floatframe.joints import JointCoordinate
 from floatframe.results.sensors import StressSensor
 from floatframe.sensors import Channel, StressChannel
 from tests.floatframe.cli.examples import PENDULUM
+from tests.floatframe.command import answer_of_floatframe
 from tests.floatframe.point_masses import PointMasses, random_point_masses, reduced_body, stiffness
 
 M_, K_, C_ = 2.0, 50.0, 3.0
@@ -191,12 +190,6 @@ def pendulum(tmp_path):
     return path
 
 
-def run(*words, code=0):
-    result = CliRunner().invoke(app, [str(word) for word in words])
-    assert result.exit_code == code, result.output
-    return result.stdout if code == 0 else " ".join(result.stderr.split())
-
-
 def exact_response(s):
     """Of turn over torque, turn over push, tip over torque; the rod hangs along -y, its tip at (0, -1)."""
     turn = 1 / (9.81 + s**2 * (1 / 6 + 0.5))
@@ -207,7 +200,7 @@ def test_linearize_writes_the_channels_of_the_file_in_three_forms(pendulum):
     s = 2j
     for suffix in (".npz", ".mat", ".h5"):
         path = pendulum.with_suffix(suffix)
-        assert "2 inputs, 2 outputs" in run("linearize", pendulum, "-o", path)
+        assert "2 inputs, 2 outputs" in answer_of_floatframe("linearize", pendulum, "-o", path)
         if suffix == ".npz":
             with np.load(path) as data:
                 A, B, C, D = (data[name] for name in "ABCD")
@@ -228,14 +221,14 @@ def test_linearize_writes_the_channels_of_the_file_in_three_forms(pendulum):
         assert_allclose(H, [[tip, push], [turn, push]], rtol=1e-8, atol=1e-8)
     pendulum.write_text(PENDULUM)
     for suffix in (".mat", ".h5"):
-        assert "0 inputs" in run("linearize", pendulum, "-o", pendulum.with_suffix(suffix))
+        assert "0 inputs" in answer_of_floatframe("linearize", pendulum, "-o", pendulum.with_suffix(suffix))
 
 
 def test_response_draws_and_writes_what_the_textbook_says(pendulum):
-    text = run("response", pendulum, "--band", "0.1:10")
+    text = answer_of_floatframe("response", pendulum, "--band", "0.1:10")
     assert pendulum.with_suffix(".response.png").read_bytes().startswith(b"\x89PNG")
     assert "turn / torque" in text
-    run(
+    answer_of_floatframe(
         "response",
         pendulum,
         "--band",
@@ -282,7 +275,7 @@ def test_plot_of_responses_has_a_panel_for_each_unit_and_one_for_phases():
 def test_mistakes_in_channels_are_answered(pendulum, old, new, words):
     assert LINEAR.count(old) == 1
     pendulum.write_text(LINEAR.replace(old, new))
-    assert words in run("linearize", pendulum, code=2)
+    assert words in answer_of_floatframe("linearize", pendulum, code=2)
 
 
 @pytest.mark.parametrize(("words", "message"), [
@@ -292,7 +285,7 @@ def test_mistakes_in_channels_are_answered(pendulum, old, new, words):
     (["response", "--band", "5:1"], "an ascending band above 0"),
 ])  # fmt: skip
 def test_commands_refuse_what_they_cannot_do(pendulum, words, message):
-    assert message in run(words[0], pendulum, *words[1:], code=2)
+    assert message in answer_of_floatframe(words[0], pendulum, *words[1:], code=2)
 
 
 SHAKEN = PENDULUM.replace(
@@ -321,7 +314,7 @@ def test_files_name_sensors_as_outputs_and_bases_as_inputs(pendulum):
     """A rod that hangs on a hinge shaken sideways with a: force x on the ground m a (1 + s² l c/(s² + g c)), ..."""
     pendulum.write_text(SHAKEN)
     path = pendulum.with_suffix(".npz")
-    text = run("linearize", pendulum, "-o", path)
+    text = answer_of_floatframe("linearize", pendulum, "-o", path)
     with np.load(path) as data:
         names, units = list(data["outputs"]), list(data["output_units"])
         A, B, C, D = (data[name] for name in "ABCD")
@@ -336,7 +329,7 @@ def test_files_name_sensors_as_outputs_and_bases_as_inputs(pendulum):
     assert_allclose(H[0, 0], -m * (1 + c * s**2 * turn), rtol=1e-9)
     for name in ("side", "load.force x", "bearing.force x"):
         csv_path = pendulum.with_suffix(".csv")
-        run("response", pendulum, "--band", "0.7:0.9", "--out", name, "-o", csv_path)
+        answer_of_floatframe("response", pendulum, "--band", "0.7:0.9", "--out", name, "-o", csv_path)
         with open(csv_path, newline="") as file:
             rows = list(csv.reader(file))
         assert_allclose(float(rows[1][1]), abs(H[0, 0]), rtol=1e-6)
@@ -353,4 +346,4 @@ def test_files_name_sensors_as_outputs_and_bases_as_inputs(pendulum):
 def test_mistakes_in_outputs_of_sensors_are_answered(pendulum, old, new, words):
     assert SHAKEN.count(old) == 1
     pendulum.write_text(SHAKEN.replace(old, new))
-    assert words in run("linearize", pendulum, code=2)
+    assert words in answer_of_floatframe("linearize", pendulum, code=2)

@@ -5,7 +5,6 @@ import json
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from typer.testing import CliRunner
 
 from floatframe import (
     GROUND,
@@ -20,11 +19,11 @@ from floatframe import (
     inverse_dynamics,
 )
 from floatframe.analyses import drive_forces, with_motors
-from floatframe.cli.app import app
 from floatframe.components.mechanisms import slider_crank
 from floatframe.components.mechanisms.rods import slender_inertia
 from floatframe.errors import ModelError
 from floatframe.model.functions.time_functions import harmonic
+from tests.floatframe.command import run_floatframe
 from tests.floatframe.examples import CRANK, TURN
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 
@@ -130,7 +129,7 @@ def driven(tmp_path):
 
 
 def run(*words, code=0):
-    result = CliRunner().invoke(app, [str(word) for word in words])
+    result = run_floatframe(*words)
     assert result.exit_code == code, result.output
     return result.output if code else result.stdout
 

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from floatframe import JointForce, Marker, PointForce, UserForce, linearize, static_equilibrium
-from floatframe.analyses import ParameterInput, campbell, consistent_state, steady_rotation
+from floatframe.analyses import ParameterInput, campbell, steady_rotation
 from floatframe.errors import ModelError
 from floatframe.joints import JointCoordinate
 from floatframe.results.sensors.places import PLACE_QUANTITIES, TURNING
@@ -22,7 +22,16 @@ from floatframe.sensors import (
     StressSensor,
     VonMisesSensor,
 )
-from tests.floatframe.analyses.examples import compare, flexible, machine, rotor, sensors, values_of
+from tests.floatframe.analyses.examples import (
+    assert_slopes,
+    compare,
+    flexible,
+    machine,
+    rotor,
+    sensors,
+    slope_at_once,
+    values_of,
+)
 
 
 @pytest.fixture(scope="module")
@@ -98,21 +107,8 @@ def with_input(name, s):
 def test_inputs_act_as_forces_of_their_size_at_once_and_in_equilibrium(rest, name):
     system, about, _ = rest
     linear = linearize(system, about, inputs=[INPUTS[name][0]], outputs=sensors())
-    at_once = linear.D + linear.L_acceleration @ np.linalg.solve(linear.M, linear.B)
-    found = {True: [], False: []}
-    s = 1e-4
-    for size in (s, -s):
-        other = with_input(name, size)
-        made = consistent_state(other, about.state, known=about.w)
-        found[True].append(values_of(other, made.state, made.u_dot, made.w, linear.outputs))
-        moved = static_equilibrium(other, about.state, tolerance=1e-12)
-        found[False].append(values_of(other, moved.state, moved.u_dot, moved.w, linear.outputs))
-    for is_at_once, slope in ((True, at_once), (False, linear.response([0.0])[0].real)):
-        plus, minus = found[is_at_once]
-        difference = (plus - minus) / (2 * s)
-        scale = np.abs(difference).max()
-        assert_allclose(slope[:, 0], difference, rtol=3e-6, atol=1e-8 * scale)
-        assert scale > 1e-3
+    assert_slopes(linear, lambda size: with_input(name, size), about, 1e-4, rtol=3e-6, atol=1e-8)
+    at_once = slope_at_once(linear)
     assert_allclose(linear.feedthrough(), at_once, rtol=0, atol=1e-9 * np.abs(at_once).max())
 
 

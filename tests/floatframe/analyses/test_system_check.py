@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
-from typer.testing import CliRunner
 
 from floatframe import FlexibleBody, Marker, RevoluteJoint, System
 from floatframe.analyses.system_check import check_system, system_vibrations, tangents_at
-from floatframe.cli.app import app
 from floatframe.engine.initial_conditions.initial import consistent_motion
 from floatframe.files.system_file.read_system import read_system
+from tests.floatframe.command import run_floatframe
 from tests.synthetic import synthetic_reduced_body
 
 STIFFNESS, MASS, HEAVY, RADIUS = 1400.0, 0.3, 2.0, 250.0  # N/mm, t, t, mm
@@ -88,7 +87,7 @@ def sledge(tmp_path):
 
 
 def checked(path, *arguments):
-    result = CliRunner().invoke(app, ["check", str(path), "--json", *arguments])
+    result = run_floatframe("check", path, "--json", *arguments)
     record = json.loads(result.stdout) if result.stdout else None
     return result, {each["name"]: each for each in record["records"]} if record else {}
 

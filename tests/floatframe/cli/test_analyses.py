@@ -5,12 +5,9 @@ import json
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from typer.testing import CliRunner
 
-from floatframe.cli.app import app
 from tests.floatframe.cli.examples import PENDULUM
-
-runner = CliRunner()
+from tests.floatframe.command import run_floatframe
 
 
 @pytest.fixture
@@ -21,7 +18,7 @@ def pendulum(tmp_path):
 
 
 def invoke(*words, code=0):
-    result = runner.invoke(app, [str(word) for word in words])
+    result = run_floatframe(*words)
     assert result.exit_code == code, result.output
     return result.output
 

@@ -19,7 +19,9 @@ from floatframe.pictures.animation import bodies_of
 from floatframe.results.energy_balance import balance_defect, energy_scale
 from floatframe.results.export import run_record
 from floatframe.results.trajectory import read_trajectory
+from tests.cms.command import assert_refused
 from tests.floatframe.cli.examples import FLEXIBLE, RIGID
+from tests.floatframe.command import run_floatframe
 from tests.root import ROOT, heed_signals
 from tests.synthetic import synthetic_reduced_body
 
@@ -38,27 +40,13 @@ def results(tmp_path_factory) -> Path:
     """The results of the rigid pendulum, computed by the command."""
     folder = tmp_path_factory.mktemp("run")
     (folder / "swing.toml").write_text(RIGID)
-    result = run("run", folder / "swing.toml")
+    result = run_floatframe("run", folder / "swing.toml")
     assert result.exit_code == 0, result.output
     return folder / "swing.h5"
 
 
-def run(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments])
-
-
 def contents(folder: Path) -> dict[str, bytes]:
     return {p.name: p.read_bytes() if p.is_file() else b"" for p in sorted(folder.iterdir())}
-
-
-def assert_refused(result, *words):
-    """Exit code 2, one message on standard error with these words, no traceback."""
-    assert result.exit_code == 2, result.output
-    assert result.stderr.startswith("error: ")
-    assert result.stderr.count("error: ") == 1
-    assert "Traceback" not in result.output
-    for word in words:
-        assert word in result.stderr
 
 
 def test_run_computes_the_motion_that_the_file_describes(results):
@@ -74,7 +62,7 @@ def test_run_computes_the_motion_that_the_file_describes(results):
 
 
 def test_run_prints_steps_balance_and_drift(folder):
-    result = run("run", folder / "swing.toml", "-o", folder / "out.h5")
+    result = run_floatframe("run", folder / "swing.toml", "-o", folder / "out.h5")
     assert result.exit_code == 0, result.output
     for word in ("500", "Newton iterations", "wall time", "energy defect", "kinetic", "pin", "wrote"):
         assert word in result.stdout
@@ -84,7 +72,7 @@ def test_run_prints_steps_balance_and_drift(folder):
 def test_a_flexible_body_runs_from_its_modal_file(folder):
     write(synthetic_reduced_body(), folder / "part.h5")
     (folder / "spin.toml").write_text(FLEXIBLE)
-    result = run("run", folder / "spin.toml")
+    result = run_floatframe("run", folder / "spin.toml")
     assert result.exit_code == 0, result.output
     record = run_record(read_trajectory(folder / "spin.h5"))
     assert record["bodies"][0]["n_modes"] == 5
@@ -92,11 +80,11 @@ def test_a_flexible_body_runs_from_its_modal_file(folder):
 
 
 def test_info_shows_the_run(results):
-    result = run("info", results)
+    result = run_floatframe("info", results)
     assert result.exit_code == 0, result.output
     for word in ("swing", "m-kg-s", "stick", "GeneralizedAlpha", "rho_inf = 0.8", "energy defect", "pin"):
         assert word in result.stdout
-    record = json.loads(run("info", results, "--json").stdout)
+    record = json.loads(run_floatframe("info", results, "--json").stdout)
     assert record["n_steps"] == 500
     assert record["t_last"] == 0.5
     assert record["energy_defect"] < 1e-4
@@ -107,7 +95,7 @@ def test_info_shows_the_run(results):
     ("suffix", "magic"), [("png", b"\x89PNG"), ("svg", b"<?xml"), pytest.param("pdf", b"%PDF", marks=pytest.mark.long)]
 )
 def test_plot_draws_a_picture(results, tmp_path, suffix, magic):
-    result = run("plot", results, "-o", tmp_path / f"swing.{suffix}")
+    result = run_floatframe("plot", results, "-o", tmp_path / f"swing.{suffix}")
     assert result.exit_code == 0, result.output
     assert (tmp_path / f"swing.{suffix}").read_bytes().startswith(magic)
     assert sorted(contents(tmp_path)) == [f"swing.{suffix}"]
@@ -119,7 +107,7 @@ def test_plot_writes_more_than_eight_panels_as_pages(folder):
     text = (folder / "swing.toml").read_text()
     (folder / "swing.toml").write_text("\n".join([text, *sensors]))
     for words in (("run", "swing.toml"), ("plot", "swing.h5"), ("plot", "swing.h5", "-o", "swing.pdf")):
-        result = run(words[0], *(folder / word if "." in word else word for word in words[1:]))
+        result = run_floatframe(words[0], *(folder / word if "." in word else word for word in words[1:]))
         assert result.exit_code == 0, result.output
     assert {"swing.png", "swing-2.png", "swing.pdf"} < set(contents(folder))
     assert "swing-3.png" not in contents(folder)
@@ -129,22 +117,22 @@ def test_plot_writes_more_than_eight_panels_as_pages(folder):
 def test_plot_goes_without_the_modal_files_and_says_so(folder):
     write(synthetic_reduced_body(), folder / "part.h5")
     (folder / "spin.toml").write_text(FLEXIBLE)
-    assert run("run", folder / "spin.toml").exit_code == 0
-    assert "note" not in run("plot", folder / "spin.h5").stderr
+    assert run_floatframe("run", folder / "spin.toml").exit_code == 0
+    assert "note" not in run_floatframe("plot", folder / "spin.h5").stderr
     (folder / "part.h5").unlink()
-    result = run("plot", folder / "spin.h5")
+    result = run_floatframe("plot", folder / "spin.h5")
     assert result.exit_code == 0
     assert result.stderr.startswith("note: elastic displacement is omitted")
 
 
 def test_plot_refuses_other_kinds_of_files(results, tmp_path):
-    assert_refused(run("plot", results, "-o", tmp_path / "swing.jpg"), ".png, .svg, .pdf")
-    assert_refused(run("plot", results, "-o", results), "this is an input; choose another name")
+    assert_refused(run_floatframe("plot", results, "-o", tmp_path / "swing.jpg"), ".png, .svg, .pdf")
+    assert_refused(run_floatframe("plot", results, "-o", results), "this is an input; choose another name")
     assert contents(tmp_path) == {}
 
 
 def test_animate_draws_a_film(results, tmp_path):
-    result = run("animate", results, "-o", tmp_path / "swing.gif", "--speed", "100")
+    result = run_floatframe("animate", results, "-o", tmp_path / "swing.gif", "--speed", "100")
     assert result.exit_code == 0, result.output
     assert (tmp_path / "swing.gif").read_bytes().startswith(b"GIF8")
     assert sorted(contents(tmp_path)) == ["swing.gif"]
@@ -159,19 +147,19 @@ def test_animate_draws_a_film(results, tmp_path):
 def test_animate_refuses_what_it_cannot_draw(results, tmp_path, monkeypatch, options, words):
     (tmp_path / "swing.h5").write_bytes(results.read_bytes())
     monkeypatch.chdir(tmp_path)
-    assert_refused(run("animate", "swing.h5", *options), words)
+    assert_refused(run_floatframe("animate", "swing.h5", *options), words)
     assert sorted(contents(tmp_path)) == ["swing.h5"]
 
 
 def test_animate_refuses_a_modal_file_that_has_changed(folder):
     write(synthetic_reduced_body(), folder / "part.h5")
     (folder / "spin.toml").write_text(FLEXIBLE)
-    assert run("run", folder / "spin.toml").exit_code == 0
+    assert run_floatframe("run", folder / "spin.toml").exit_code == 0
     write(synthetic_reduced_body(seed=1), folder / "part.h5")
     before = contents(folder)
-    assert_refused(run("animate", folder / "spin.h5"), "part.h5", "has changed")
+    assert_refused(run_floatframe("animate", folder / "spin.h5"), "part.h5", "has changed")
     (folder / "part.h5").unlink()
-    assert_refused(run("animate", folder / "spin.h5"), "part.h5", "no such file")
+    assert_refused(run_floatframe("animate", folder / "spin.h5"), "part.h5", "no such file")
     assert sorted(contents(folder)) == sorted(set(before) - {"part.h5"})
 
 
@@ -200,7 +188,7 @@ def test_a_bad_system_file_ends_in_one_message_and_leaves_nothing(folder, old, n
     assert RIGID.count(old) == 1
     (folder / "swing.toml").write_text(RIGID.replace(old, new))
     before = contents(folder)
-    assert_refused(run("run", folder / "swing.toml"), *words)
+    assert_refused(run_floatframe("run", folder / "swing.toml"), *words)
     assert contents(folder) == before
 
 
@@ -210,16 +198,16 @@ def test_a_damaged_modal_file_is_refused(folder):
     (folder / "part.h5").write_bytes(damaged[:-100])
     (folder / "spin.toml").write_text(FLEXIBLE)
     before = contents(folder)
-    assert_refused(run("run", folder / "spin.toml"), "part.h5", "truncated")
+    assert_refused(run_floatframe("run", folder / "spin.toml"), "part.h5", "truncated")
     (folder / "part.h5").write_bytes(damaged[:4000] + bytes([damaged[4000] ^ 8]) + damaged[4001:])
-    assert_refused(run("run", folder / "spin.toml"), "part.h5", "altered")
+    assert_refused(run_floatframe("run", folder / "spin.toml"), "part.h5", "altered")
     assert sorted(contents(folder)) == sorted(before)
 
 
 def test_bodies_in_other_units_are_converted_with_a_note(folder, caplog):
     write(synthetic_reduced_body(), folder / "part.h5")
     (folder / "spin.toml").write_text(FLEXIBLE.replace("mm-t-s", "m-kg-s"))
-    result = run("run", folder / "spin.toml", "-o", folder / "spin.h5")
+    result = run_floatframe("run", folder / "spin.toml", "-o", folder / "spin.h5")
     assert result.exit_code == 0
     assert "part.h5 is in units mm-t-s: converted to those of the system, m-kg-s" in caplog.text
     part = bodies_of(read_trajectory(folder / "spin.h5"))["part"]
@@ -231,14 +219,14 @@ def test_a_body_with_selected_modes_is_plotted_filmed_and_exported(folder, chose
     """The modal file has five modes, and the system file says which of them move."""
     write(synthetic_reduced_body(), folder / "part.h5")
     (folder / "spin.toml").write_text(FLEXIBLE.replace("omega_B", f"{chosen}\nomega_B"))
-    assert run("run", folder / "spin.toml").exit_code == 0
+    assert run_floatframe("run", folder / "spin.toml").exit_code == 0
     results = folder / "spin.h5"
     for words in (["plot"], ["animate", "--speed", "0.1"], ["export", "--to", "csv"], ["export", "--to", "vtk"]):
-        result = run(words[0], results, *words[1:])
+        result = run_floatframe(words[0], results, *words[1:])
         assert (result.exit_code, result.stderr) == (0, ""), words
     assert {"spin.png", "spin.gif", "spin.csv", "spin.pvd"} < set(contents(folder))
     (folder / "spin.toml").unlink()
-    assert_refused(run("animate", results), "part.h5 has 5 modes, but its motion has", "put it back")
+    assert_refused(run_floatframe("animate", results), "part.h5 has 5 modes, but its motion has", "put it back")
 
 
 def test_the_output_is_checked_before_the_work(folder):
@@ -247,7 +235,7 @@ def test_the_output_is_checked_before_the_work(folder):
         ("swing.toml", "this is an input"),
         (".", "folder"),
     ]:
-        assert_refused(run("run", folder / "swing.toml", "-o", folder / output), words)
+        assert_refused(run_floatframe("run", folder / "swing.toml", "-o", folder / output), words)
     assert sorted(contents(folder)) == ["swing.toml"]
 
 
@@ -259,7 +247,7 @@ def test_a_file_that_holds_no_results_is_refused(folder, command, results, monke
     (folder / "short.h5").write_bytes(results.read_bytes()[:3000])
     for name in ("part.h5", "text.h5", "short.h5", "missing.h5"):
         before = contents(folder)
-        assert_refused(run(command, name), name)
+        assert_refused(run_floatframe(command, name), name)
         assert contents(folder) == before
 
 
@@ -289,7 +277,7 @@ def test_an_interrupted_run_can_be_read_and_leaves_the_old_results(folder, resul
     assert error.startswith("error: interrupted")
     assert "Traceback" not in error
     assert (folder / "swing.h5").read_bytes() == b"the old results"
-    result = run("info", segments)
+    result = run_floatframe("info", segments)
     assert result.exit_code == 0, result.output
     assert "did not reach its end" in result.stdout
 
@@ -357,7 +345,7 @@ def test_the_help_of_a_program_fits_a_screen(program):
 
 @pytest.mark.parametrize(("name", "meant"), [("machine", "example NAME"), ("urdf", "export FILE --to urdf")])
 def test_a_command_under_another_name_says_what_it_takes(name, meant):
-    shown = " ".join(CliRunner().invoke(app, [name]).output.replace("│", " ").split())
+    shown = " ".join(run_floatframe(name).output.replace("│", " ").split())
     assert f"Use floatframe {meant}." in shown
 
 
@@ -382,19 +370,19 @@ def test_completion_of_a_shell_offers_the_commands(shell):
 
 
 def test_version():
-    assert run("--version").stdout.startswith("floatframe ")
+    assert run_floatframe("--version").stdout.startswith("floatframe ")
 
 
 def test_info_of_a_system_file_names_the_command_that_tells_of_it(tmp_path):
     path = tmp_path / "stick.toml"
     path.write_text(RIGID)
-    result = CliRunner().invoke(app, ["info", str(path)])
+    result = run_floatframe("info", path)
     assert result.exit_code == 2
     assert f"try floatframe check {path}" in " ".join(result.output.split())
 
 
 def test_resume_asks_for_the_system_file_where_it_gets_the_results(results):
-    result = run("resume", results)
+    result = run_floatframe("resume", results)
     assert result.exit_code == 2
     assert "expected the system file (TOML) of the run, got its results" in " ".join(result.output.split())
     assert "resume swing.toml -o" in " ".join(result.output.split())

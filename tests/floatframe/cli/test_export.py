@@ -3,10 +3,9 @@
 import inspect
 
 import pytest
-from typer.testing import CliRunner
 
-from floatframe.cli.app import app
 from floatframe.cli.export import TARGETS
+from tests.floatframe.command import run_floatframe
 
 PENDULUM = """
 [system]
@@ -33,14 +32,14 @@ h = 1e-3
 
 
 def export(*words):
-    return CliRunner().invoke(app, ["export", *map(str, words)])
+    return run_floatframe("export", *words)
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("export")
     (folder / "swing.toml").write_text(PENDULUM)
-    assert CliRunner().invoke(app, ["run", str(folder / "swing.toml")]).exit_code == 0
+    assert run_floatframe("run", folder / "swing.toml").exit_code == 0
     return folder
 
 

@@ -5,10 +5,9 @@ import json
 
 import pytest
 from numpy.testing import assert_allclose
-from typer.testing import CliRunner
 
 import floatframe as ff
-from floatframe.cli.app import app
+from tests.floatframe.command import run_floatframe
 
 SWING = """
 [system]
@@ -41,7 +40,7 @@ def swing(tmp_path):
 
 
 def invoke(*words, code=0):
-    result = CliRunner().invoke(app, [str(word) for word in words])
+    result = run_floatframe(*words)
     assert result.exit_code == code, result.output
     return result.output
 

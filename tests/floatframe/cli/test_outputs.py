@@ -14,6 +14,7 @@ from floatframe.cli.app import app
 from tests.campaign.jobs import JOB
 from tests.campaign.plain_mesh import FORMATS, bar
 from tests.campaign.systems import SYSTEM
+from tests.floatframe.command import run_floatframe
 from tests.root import ROOT
 
 FLEXIBLE = """
@@ -129,7 +130,7 @@ def test_what_is_written_in_parts_refuses_a_pipe(folder, tmp_path):
         (["animate", str(folder / "run.h5")], "out.gif"),
     ):
         os.mkfifo(tmp_path / name)
-        result = CliRunner().invoke(app, [*words, "-o", str(tmp_path / name)])
+        result = run_floatframe(*words, "-o", tmp_path / name)
         assert result.exit_code == 2
         assert "device or a pipe" in result.stderr
         assert stat.S_ISFIFO((tmp_path / name).stat().st_mode)

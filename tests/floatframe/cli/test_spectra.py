@@ -6,10 +6,9 @@ import json
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from typer.testing import CliRunner
 
-from floatframe.cli.app import app
 from floatframe.files.signals import Signals, read_signals, write_rpc
+from tests.floatframe.command import run_floatframe
 
 SPRING = """
 [system]
@@ -65,13 +64,9 @@ output_every = 4
 def results(tmp_path_factory):
     folder = tmp_path_factory.mktemp("spectra")
     (folder / "box.toml").write_text(SPRING)
-    done = CliRunner().invoke(app, ["run", str(folder / "box.toml"), "-o", str(folder / "box.h5")])
+    done = run_floatframe("run", folder / "box.toml", "-o", folder / "box.h5")
     assert done.exit_code == 0, done.output
     return folder / "box.h5"
-
-
-def run(*words):
-    return CliRunner().invoke(app, [str(word) for word in words])
 
 
 def table(path):
@@ -83,7 +78,7 @@ def table(path):
 def test_the_amplitude_of_a_driven_box_stands_at_its_frequency(results, tmp_path):
     """2 mm at 20 Hz, the acceleration 2 (2 pi 20)² mm/s²; on a line of the resolution of 0.5 Hz (1000 samples)."""
     out = tmp_path / "a.csv"
-    done = run(
+    done = run_floatframe(
         "spectrum", results, "-s", "box ?.x", "--as", "amplitude", "--window", "flattop", "--resolution", 1, "-o", out
     )
     assert done.exit_code == 0, done.output
@@ -95,7 +90,7 @@ def test_the_amplitude_of_a_driven_box_stands_at_its_frequency(results, tmp_path
 
 def test_third_octaves_of_all_sensors_as_json_hold_the_mean_square(results, tmp_path):
     out = tmp_path / "a.json"
-    done = run("spectrum", results, "-s", "box 1.x", "--as", "third-octave", "--resolution", 1, "-o", out)
+    done = run_floatframe("spectrum", results, "-s", "box 1.x", "--as", "third-octave", "--resolution", 1, "-o", out)
     assert done.exit_code == 0, done.output
     (record,) = json.loads(out.read_text())
     assert (record["kind"], record["unit"], record["name"]) == ("1/3 octave (rms)", "mm", "box 1.x")
@@ -107,7 +102,7 @@ def test_third_octaves_of_all_sensors_as_json_hold_the_mean_square(results, tmp_
 def test_orders_of_a_run_up_are_drawn_and_tabled(results, tmp_path):
     out = tmp_path / "a.csv"
     words = ["spectrum", results, "-s", "hub.angle.rate", "--as", "orders", "--rotation", "hub.angle"]
-    done = run(*words, "-o", out)
+    done = run_floatframe(*words, "-o", out)
     assert done.exit_code == 0, done.output
     with out.open() as file:
         head, *rows = csv.reader(file)
@@ -116,7 +111,10 @@ def test_orders_of_a_run_up_are_drawn_and_tabled(results, tmp_path):
     assert_allclose(speeds[:, 1], 60 + 40 * speeds[:, 0], rtol=1e-6, atol=0)
     picture = tmp_path / "a.png"
     assert (
-        run("plot", results, "-s", "box 1.x", "--as", "orders", "--rotation", "hub.angle", "-o", picture).exit_code == 0
+        run_floatframe(
+            "plot", results, "-s", "box 1.x", "--as", "orders", "--rotation", "hub.angle", "-o", picture
+        ).exit_code
+        == 0
     )
     assert picture.read_bytes().startswith(b"\x89PNG")
 
@@ -124,7 +122,7 @@ def test_orders_of_a_run_up_are_drawn_and_tabled(results, tmp_path):
 @pytest.mark.parametrize("kind", ["psd", "octave", "waterfall", "amplitude"])
 def test_every_kind_is_drawn(results, tmp_path, kind):
     path = tmp_path / "a.svg"
-    done = run("plot", results, "--sensor", "box 1", "--as", kind, "-o", path)
+    done = run_floatframe("plot", results, "--sensor", "box 1", "--as", kind, "-o", path)
     assert done.exit_code == 0, done.output
     text = path.read_text()
     assert "<svg" in text
@@ -137,15 +135,17 @@ def test_responses_between_channels_of_a_measured_file(tmp_path):
     signals = Signals(t, np.stack([x, 3 * x], axis=1), ("force", "acc"), ("N", "g"))
     write_rpc(signals, tmp_path / "a.rsp")
     out = tmp_path / "h.csv"
-    done = run("spectrum", tmp_path / "a.rsp", "-s", "ac*", "--as", "response", "--input", "force", "-o", out)
+    done = run_floatframe(
+        "spectrum", tmp_path / "a.rsp", "-s", "ac*", "--as", "response", "--input", "force", "-o", out
+    )
     assert done.exit_code == 0, done.output
     head, rows = table(out)
     assert head[1] == "acc / force H1 [(g)/(N)]"
     assert_allclose(rows[1:-1, [1, 3, 5]], [[3, 3, 1]] * len(rows[1:-1]), rtol=1e-5, atol=0)
-    assert run("plot", tmp_path / "a.rsp").exit_code == 2
+    assert run_floatframe("plot", tmp_path / "a.rsp").exit_code == 2
     picture = tmp_path / "h.png"
     assert (
-        run(
+        run_floatframe(
             "spectrum", tmp_path / "a.rsp", "-s", "acc", "--as", "response", "--input", "force", "-o", picture
         ).exit_code
         == 0
@@ -154,13 +154,13 @@ def test_responses_between_channels_of_a_measured_file(tmp_path):
 
 def test_sensors_are_chosen_for_export_by_name_column_and_wildcard(results, tmp_path):
     out = tmp_path / "a.csv"
-    assert run("export", results, "-s", "box 2.x", "-s", "hub*", "-o", out).exit_code == 0
+    assert run_floatframe("export", results, "-s", "box 2.x", "-s", "hub*", "-o", out).exit_code == 0
     head, rows = table(out)
     assert head[1] == "box 2.x x [mm/s²]"
     assert [name for name in head[2:] if not name.startswith("hub.angle")] == []
     assert len(rows) == 1001
     drive = tmp_path / "drive.drv"
-    assert run("export", results, "-s", "box 1.x", "-o", drive).exit_code == 0
+    assert run_floatframe("export", results, "-s", "box 1.x", "-o", drive).exit_code == 0
     found = read_signals(drive)
     assert (found.names, found.units) == (("box 1.x",), ("mm",))
     assert_allclose(found.values[:, 0], 2 * np.sin(40 * np.pi * found.time), rtol=0, atol=1e-6)
@@ -169,7 +169,7 @@ def test_sensors_are_chosen_for_export_by_name_column_and_wildcard(results, tmp_
 @pytest.mark.parametrize("command", ["plot", "export", "spectrum"])
 def test_all_missing_names_are_told_with_the_nearest(results, tmp_path, command):
     before = list(tmp_path.iterdir())
-    done = run(command, results, "-s", "bxo 1", "-s", "box 1.xx", "-s", "hib*", "-o",
+    done = run_floatframe(command, results, "-s", "bxo 1", "-s", "box 1.xx", "-s", "hib*", "-o",
                tmp_path / ("a.png" if command == "plot" else "a.csv"))  # fmt: skip
     assert done.exit_code == 2
     words = " ".join(done.stderr.split())
@@ -191,6 +191,6 @@ def test_all_missing_names_are_told_with_the_nearest(results, tmp_path, command)
     ],
 )
 def test_impossible_spectra_are_refused(results, words, told):
-    done = run("spectrum", results, *words)
+    done = run_floatframe("spectrum", results, *words)
     assert done.exit_code == 2
     assert told in " ".join(done.stderr.split())

@@ -16,6 +16,8 @@ from floatframe.files.system_file.recorded_system import recorded_system
 from floatframe.files.system_file.run_section import RunOptions
 from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_matrix
 from floatframe.results.trajectory import read_trajectory
+from tests.cms.command import run_cms
+from tests.floatframe.command import run_floatframe
 
 CART = """
 [parameters]
@@ -111,7 +113,7 @@ def test_a_run_from_another_system_is_refused(folder, old, new, words):
     run("run", folder / "cart.toml", "-o", folder / "first.h5")
     text = CART.replace(old, new).replace('body_b = "cart"', f'body_b = "{new[:-1] if "]" in new else "cart"}"')
     (folder / "next.toml").write_text(text + 'from = "first.h5"\n')
-    result = CliRunner().invoke(app, ["run", str(folder / "next.toml")])
+    result = run_floatframe("run", folder / "next.toml")
     assert result.exit_code == 2
     assert "run.from" in result.stderr
     assert words in result.stderr
@@ -121,7 +123,7 @@ def test_a_run_does_not_overwrite_the_state_that_it_begins_from(folder):
     run("run", folder / "cart.toml", "-o", folder / "first.h5")
     (folder / "next.toml").write_text('extends = "cart.toml"\n[run]\nfrom = "first.h5"\n')
     for source in ("first.h5", "cart.toml"):
-        result = CliRunner().invoke(app, ["run", str(folder / "next.toml"), "-o", str(folder / source)])
+        result = run_floatframe("run", folder / "next.toml", "-o", folder / source)
         assert result.exit_code == 2
         assert "this is an input" in result.stderr
 
@@ -141,7 +143,7 @@ def test_a_sweep_begins_each_run_in_its_equilibrium(folder):
 
 def test_computations_that_begin_as_placed_refuse_another_start(folder):
     (folder / "cart.toml").write_text(CART + 'start = "equilibrium"\n')
-    result = CliRunner().invoke(app, ["gradient", str(folder / "cart.toml"), "-p", "mass", "--out", "up.distance"])
+    result = run_floatframe("gradient", folder / "cart.toml", "-p", "mass", "--out", "up.distance")
     assert result.exit_code == 2
     assert "run.start: this computation begins with the bodies as placed; remove the key" in result.stderr
 
@@ -152,7 +154,7 @@ def test_computations_that_begin_as_placed_refuse_another_start(folder):
 )
 def test_the_key_from_is_called_so_in_messages(folder, line, words):
     (folder / "cart.toml").write_text(CART + line + "\n")
-    result = CliRunner().invoke(app, ["run", str(folder / "cart.toml")])
+    result = run_floatframe("run", folder / "cart.toml")
     assert result.exit_code == 2
     assert words in result.stderr
     assert "continues" not in result.stderr
@@ -169,14 +171,14 @@ def test_set_replaces_parameters_and_keys_and_the_results_record_them(folder):
 
 @pytest.mark.parametrize("command", ["static", "modes", "linearize"])
 def test_analyses_take_the_values_of_set(folder, command):
-    result = CliRunner().invoke(app, [command, str(folder / "cart.toml"), "--set", "nothing=1"])
+    result = run_floatframe(command, folder / "cart.toml", "--set", "nothing=1")
     assert result.exit_code == 2
     assert "there is no parameter 'nothing'; choices: mass, stiffness" in " ".join(result.stderr.split())
 
 
 @pytest.mark.parametrize("given", ["mass", "=3"])
 def test_set_without_name_or_value_is_refused(folder, given):
-    result = CliRunner().invoke(app, ["run", str(folder / "cart.toml"), "--set", given])
+    result = run_floatframe("run", folder / "cart.toml", "--set", given)
     assert result.exit_code == 2
     assert "NAME=VALUE" in result.stderr
 
@@ -191,7 +193,7 @@ def test_the_shown_file_describes_the_same_system(folder, program):
 
 def test_a_file_of_another_kind_is_refused_with_its_command(folder):
     (folder / "cart.toml").write_text('kind = "system"\n' + CART)
-    result = CliRunner().invoke(cms_app, ["reduce", str(folder / "cart.toml")])
+    result = run_cms("reduce", folder / "cart.toml")
     assert result.exit_code == 2
     assert result.stderr.count("\n") == 1
     assert 'expected a file of kind "job"; run this one by floatframe run cart.toml' in result.stderr
@@ -200,17 +202,17 @@ def test_a_file_of_another_kind_is_refused_with_its_command(folder):
 def test_a_file_without_kind_but_with_tables_of_another_is_refused_with_its_command(folder):
     """No key of the file belongs to a job; one required table is enough for the list of problems."""
     (folder / "cart.toml").write_text(CART)
-    result = CliRunner().invoke(cms_app, ["reduce", str(folder / "cart.toml")])
+    result = run_cms("reduce", folder / "cart.toml")
     assert result.exit_code == 2
     assert result.stderr.count("\n") == 1
     assert 'its tables are those of kind "system"; run it by floatframe run cart.toml' in result.stderr
     (folder / "cart.toml").write_text(CART + "\n[reduction]\n")
-    assert "problems:" in CliRunner().invoke(cms_app, ["reduce", str(folder / "cart.toml")]).stderr
+    assert "problems:" in run_cms("reduce", folder / "cart.toml").stderr
 
 
 def test_an_unknown_kind_is_refused_with_the_nearest(folder):
     (folder / "cart.toml").write_text('kind = "sytem"\n' + CART)
-    result = CliRunner().invoke(app, ["run", str(folder / "cart.toml")])
+    result = run_floatframe("run", folder / "cart.toml")
     assert result.exit_code == 2
     assert "did you mean 'system'?" in result.stderr
 

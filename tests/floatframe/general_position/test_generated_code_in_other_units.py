@@ -6,15 +6,13 @@ import fmpy
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.spatial.transform import Rotation
 
-from floatframe import GROUND, Gravity, JointForce, Marker, PrismaticJoint, RevoluteJoint, RigidBody, System
+from floatframe import JointForce
 from floatframe.design import generate_fmu
 from tests.floatframe.design.generation.calls import python_function
+from tests.floatframe.general_position.arm import PLACE, R, arm_with
 from tests.floatframe.other_units import SI, SIZES, in_units, other_units
 
-R = Rotation.from_rotvec([0.7, -0.4, 1.1]).as_matrix()
-PLACE = np.array([30.0, -20.0, 15.0])
 UNITS = ["mm-t-s", "mm-kg-ms", "in-slinch-s"]
 Z, Z_DOT, Z_DDOT = np.array([0.4, 0.05]), np.array([2.0, -0.6]), np.array([5.0, 3.0])
 OF = [("rad", "N m"), ("m", "N")]  #: units of each coordinate and of what acts along it
@@ -23,21 +21,7 @@ OF = [("rad", "N m"), ("m", "N")]  #: units of each coordinate and of what acts 
 @cache
 def arm():
     """An arm on a hinge and a block on a slide in it, each with a spring, a damper and a preload."""
-    places = np.array([0.5, -0.2, 0.4]), np.array([1.1, -0.1, 0.5])
-    bodies = [
-        RigidBody("arm", 2.0, np.diag([0.1, 0.12, 0.14]), (0.3, 0.05, 0.02), position=places[0]),
-        RigidBody("block", 0.7, np.diag([0.02, 0.03, 0.04]), (0.01, 0.02, 0.03), position=places[1]),
-    ]
-    joints = [
-        RevoluteJoint("hinge", Marker(GROUND, position=places[0]), Marker("arm"), axis=(0.6, 0.8, 0)),
-        PrismaticJoint("slide", Marker("arm", position=places[1] - places[0]), Marker("block"), axis=(0.8, 0, 0.6)),
-    ]
-    forces = [
-        Gravity((0.5, -1.0, -9.81)),
-        JointForce("rub", "hinge", "angle", stiffness=60.0, free=0.1, damping=0.3, preload=0.2),
-        JointForce("spring", "slide", "distance", stiffness=200.0, free=0.02, damping=3.0, preload=1.5),
-    ]
-    return System(bodies, joints, forces)
+    return arm_with(JointForce("spring", "slide", "distance", stiffness=200.0, free=0.02, damping=3.0, preload=1.5))
 
 
 def placed(other):

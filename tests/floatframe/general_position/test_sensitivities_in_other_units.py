@@ -6,25 +6,18 @@ from functools import cache
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.spatial.transform import Rotation
 
 from floatframe import (
     GROUND,
-    Gravity,
     JointForce,
     Marker,
-    PrismaticJoint,
-    RevoluteJoint,
-    RigidBody,
     SpringDamper,
-    System,
 )
 from floatframe.design import sensitivities
 from floatframe.sensors import EnergySensor, PlaceSensor, ReactionSensor
+from tests.floatframe.general_position.arm import PLACE, R, arm_with
 from tests.floatframe.other_units import SI, SIZES, in_units, other_units
 
-R = Rotation.from_rotvec([0.7, -0.4, 1.1]).as_matrix()
-PLACE = np.array([30.0, -20.0, 15.0])
 UNITS = ["mm-kg-ms", "in-slinch-s", *SIZES, pytest.param("mm-t-s", marks=pytest.mark.long)]
 OUTPUTS = {"hinge.angle value": "rad", "slide.distance rate": "m/s", "load force size": "N", "load moment size": "N m",
            "energy kinetic": "J", "hand size": "m/s^2"}  # fmt: skip
@@ -36,22 +29,10 @@ MODES = {"frequency 1": "Hz", "frequency 2": "Hz", "damping 2": "1"}
 @cache
 def arm():
     """An arm on a hinge with spring and damper, a block on a sprung slide in it, and a stay."""
-    places = np.array([0.5, -0.2, 0.4]), np.array([1.1, -0.1, 0.5])
-    bodies = [
-        RigidBody("arm", 2.0, np.diag([0.1, 0.12, 0.14]), (0.3, 0.05, 0.02), position=places[0]),
-        RigidBody("block", 0.7, np.diag([0.02, 0.03, 0.04]), (0.01, 0.02, 0.03), position=places[1]),
-    ]
-    joints = [
-        RevoluteJoint("hinge", Marker(GROUND, position=places[0]), Marker("arm"), axis=(0.6, 0.8, 0)),
-        PrismaticJoint("slide", Marker("arm", position=places[1] - places[0]), Marker("block"), axis=(0.8, 0, 0.6)),
-    ]
-    forces = [
-        Gravity((0.5, -1.0, -9.81)),
-        JointForce("rub", "hinge", "angle", stiffness=60.0, free=0.1, damping=0.3, preload=0.2),
+    return arm_with(
         JointForce("spring", "slide", "distance", stiffness=200.0, damping=3.0),
         SpringDamper("stay", Marker(GROUND, position=(0.2, 0.1, 1.5)), Marker("arm", position=(0.6, 0, 0)), 90, 2, 0.9),
-    ]
-    return System(bodies, joints, forces)
+    )
 
 
 SENSORS = [

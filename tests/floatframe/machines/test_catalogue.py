@@ -1,11 +1,10 @@
 """Machines in a folder of one's own: the files as shipped, and refusals."""
 
 import pytest
-from typer.testing import CliRunner
 
-from floatframe.cli.app import app
 from floatframe.errors import ModelError
 from floatframe.machines import MACHINES, copy_machine, machine_files
+from tests.floatframe.command import run_floatframe
 
 
 @pytest.mark.parametrize("name", MACHINES)
@@ -40,12 +39,12 @@ def test_an_unknown_machine_is_refused_with_the_nearest():
 
 
 def test_the_command_lists_them():
-    outcome = CliRunner().invoke(app, ["example"])
+    outcome = run_floatframe("example")
     assert outcome.exit_code == 0
     assert all(name in outcome.output for name in MACHINES)
 
 
 def test_the_old_name_of_the_command_names_the_new_one():
-    outcome = CliRunner().invoke(app, ["machine", "kart", "-o", "mine"])
+    outcome = run_floatframe("machine", "kart", "-o", "mine")
     assert outcome.exit_code != 0
     assert "floatframe example kart -o mine" in outcome.output

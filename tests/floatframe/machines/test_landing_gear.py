@@ -7,7 +7,6 @@ from scipy.integrate import cumulative_trapezoid, solve_ivp
 
 import cms
 import floatframe as ff
-from floatframe.machines import copy_machine
 from floatframe.machines.landing_gear import retraction
 from floatframe.model.functions.tables import monotone_table
 from floatframe.model.rotations import rotation_matrix
@@ -18,16 +17,8 @@ RADIUS, TYRE, TYRE_DAMPING, FRICTION, SPIN = 0.35, 2.5e5, 300.0, 0.7, 1.5
 METHOD = ff.GeneralizedAlpha(0.8, 1e-10)
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    place = tmp_path_factory.mktemp("gear")
-    copy_machine("landing-gear", place)
-    cms.write(cms.reduce_job(place / "piston.toml"), place / "piston.h5")
-    return place
-
-
-def dropped(folder, t_end, h, **changes):
-    system, _ = ff.read_system(folder / "drop.toml", changes)
+def dropped(gear_folder, t_end, h, **changes):
+    system, _ = ff.read_system(gear_folder / "drop.toml", changes)
     motion = ff.integrate(system, METHOD, t_end, h)
     strut, tyre = (ff.results.element_motion(system, motion, name).outputs for name in ("strut", "tyre"))
     return motion, strut, tyre
@@ -56,18 +47,18 @@ def two_masses(lower, t_end):
     return solve_ivp(rates, (0, t_end), start, method="Radau", rtol=1e-9, atol=1e-11, max_step=2e-3).y
 
 
-def test_the_drop_of_a_rigid_gear_is_that_of_two_masses(folder):
+def test_the_drop_of_a_rigid_gear_is_that_of_two_masses(gear_folder):
     t_end = 0.2
-    motion, strut, _ = dropped(folder, t_end, 5e-5, **{"bodies.piston.is_rigid": True})
-    exact = two_masses(cms.read(folder / "piston.h5").moments.gram[0, 0] + 28 + 25, t_end)
+    motion, strut, _ = dropped(gear_folder, t_end, 5e-5, **{"bodies.piston.is_rigid": True})
+    exact = two_masses(cms.read(gear_folder / "piston.h5").moments.gram[0, 0] + 28 + 25, t_end)
     assert strut["stroke"].max() > 0.25
     found = [motion.body("carriage").r[-1, 2] - 1.15, motion.body("wheel").r[-1, 2] - RADIUS]
     assert_allclose(found, exact[:2, -1], rtol=2e-5)
     assert_allclose(strut["stroke"].max(), (exact[1] - exact[0]).max(), rtol=1e-4)
 
 
-def test_a_standing_wheel_spins_up_by_the_friction_of_the_ground_and_the_piston_springs_back(folder):
-    motion, strut, tyre = dropped(folder, 0.2, 1e-4)
+def test_a_standing_wheel_spins_up_by_the_friction_of_the_ground_and_the_piston_springs_back(gear_folder):
+    motion, strut, tyre = dropped(gear_folder, 0.2, 1e-4)
     spin = motion.body("wheel").omega_B[:, 1]
     lever = RADIUS - tyre["deflection"] / 3  # of the rolling radius: the power of slip is lost, no more
     gained = -cumulative_trapezoid(tyre["Fx"] * lever, motion.t, initial=0)
@@ -86,8 +77,8 @@ def test_a_standing_wheel_spins_up_by_the_friction_of_the_ground_and_the_piston_
     assert back[k:].max() > 0.1 * -back[k]
 
 
-def test_a_retracting_gear_follows_its_circles_and_the_jack_gives_what_it_gains(folder):
-    system, _ = ff.read_system(folder / "retraction.toml")
+def test_a_retracting_gear_follows_its_circles_and_the_jack_gives_what_it_gains(gear_folder):
+    system, _ = ff.read_system(gear_folder / "retraction.toml")
     motion = ff.integrate(system, METHOD, 7.0, 4e-3)
     theta = ff.joints.JointCoordinate("hinge", "angle").measure(system, motion).value
     jack = ff.results.element_motion(system, motion, "hydraulics").outputs
@@ -104,9 +95,9 @@ def test_a_retracting_gear_follows_its_circles_and_the_jack_gives_what_it_gains(
 
 
 @pytest.fixture(scope="module")
-def aircraft(folder):
-    cms.write(cms.reduce_job(folder / "wing.toml"), folder / "wing.h5")
-    return folder / "aircraft.toml"
+def aircraft(gear_folder):
+    cms.write(cms.reduce_job(gear_folder / "wing.toml"), gear_folder / "wing.h5")
+    return gear_folder / "aircraft.toml"
 
 
 def test_an_aircraft_stands_on_its_three_gears_by_the_rule_of_levers(aircraft):

@@ -1,28 +1,18 @@
 """Braking of the landing gear: the rigid gear against SciPy's wheel, tyre and controller; locked wheel, gear walk."""
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 import cms
 import floatframe as ff
-from floatframe.machines import copy_machine
 
 METHOD = ff.GeneralizedAlpha(0.8, 1e-8)
 RIGID = {"bodies.piston.is_rigid": True, "forces.drag_brace.stiffness": 1e10}
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    place = tmp_path_factory.mktemp("gear")
-    copy_machine("landing-gear", place)
-    cms.write(cms.reduce_job(place / "piston.toml"), place / "piston.h5")
-    return place
-
-
-def braked(folder, t_end, h, **changes):
-    system, _ = ff.read_system(folder / "braking.toml", changes)
+def braked(gear_folder, t_end, h, **changes):
+    system, _ = ff.read_system(gear_folder / "braking.toml", changes)
     motion = ff.integrate(system, METHOD, t_end, h)
     brake, tyre = (ff.results.element_motion(system, motion, name).outputs for name in ("brake", "tyre"))
     return system, motion, brake, tyre
@@ -68,10 +58,10 @@ def quarter(mass, t):
     return solve_ivp(rates, (0, t[-1]), start, t_eval=t, method="LSODA", rtol=1e-8, atol=1e-8, max_step=1e-2).y
 
 
-def test_a_rigid_gear_with_anti_skid_brakes_as_the_same_equations_by_scipy(folder):
+def test_a_rigid_gear_with_anti_skid_brakes_as_the_same_equations_by_scipy(gear_folder):
     """Over dry and wet road; friction, tread, sensor, valve and brake stand in `quarter` once more."""
-    _, motion, brake, tyre = braked(folder, 2.6, 1e-3, **RIGID)
-    mass = 1100 + 25 + 28 + 25 + cms.read(folder / "piston.h5").moments.gram[0, 0]
+    _, motion, brake, tyre = braked(gear_folder, 2.6, 1e-3, **RIGID)
+    mass = 1100 + 25 + 28 + 25 + cms.read(gear_folder / "piston.h5").moments.gram[0, 0]
     exact = quarter(mass, motion.t)
     assert tyre["Fz"].std() < 1e-3 * mass * 9.81
     assert_allclose(motion.body("carriage").r[:, 0], exact[0], rtol=1e-4, atol=1e-3)
@@ -102,8 +92,8 @@ def walking_frequency(stroke):
     return np.sqrt(squares[1]) / (2 * np.pi)
 
 
-def test_without_anti_skid_the_wheel_locks_and_the_leg_walks_at_its_own_frequency(folder):
-    system, motion, brake, tyre = braked(folder, 2.8, 1e-3, **{"elements.brake.anti_skid": False})
+def test_without_anti_skid_the_wheel_locks_and_the_leg_walks_at_its_own_frequency(gear_folder):
+    system, motion, brake, tyre = braked(gear_folder, 2.8, 1e-3, **{"elements.brake.anti_skid": False})
     t, wet = motion.t, (motion.t > 2.05) & (motion.t < 2.75)
     locked = (t > 0.85) & (t < 1.9)
     assert np.abs(brake["speed"][locked]).max() < 0.01 * 134.5

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from typer.testing import CliRunner
 
 from floatframe import (
     GROUND,
@@ -19,13 +18,13 @@ from floatframe import (
     linearize,
     system_modes,
 )
-from floatframe.cli.app import app
 from floatframe.errors import ModelError, ResultsError
 from floatframe.forces import Bushing
 from floatframe.pictures.body_colors import VON_MISES
 from floatframe.pictures.glyphs import BUSHING_COLOR, JOINT_COLOR, SPRING_COLOR
 from floatframe.pictures.mode_film import mode_scene
 from tests.floatframe.cli.examples import PENDULUM
+from tests.floatframe.command import run_floatframe
 from tests.synthetic import synthetic_reduced_body
 
 QUARTERS = np.exp(0.5j * np.pi * np.arange(4))
@@ -79,7 +78,7 @@ def test_eig_draws_modes_into_films_and_pictures(tmp_path, monkeypatch):
     path.write_text(PENDULUM)
 
     def modes(*words, code=0):
-        result = CliRunner().invoke(app, ["modes", str(path), *(str(word) for word in words)])
+        result = run_floatframe("modes", path, *words)
         assert result.exit_code == code, result.output
         return " ".join(result.output.split())
 

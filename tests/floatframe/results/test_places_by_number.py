@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from typer.testing import CliRunner
 
 import cms
 from fe_models.body.fe_body import Interface
@@ -30,7 +29,6 @@ from floatframe import (
     integrate,
     read_results,
 )
-from floatframe.cli.app import app
 from floatframe.errors import ModelError
 from floatframe.pictures.animation import motion_scene
 from floatframe.pictures.body_colors import VON_MISES
@@ -49,6 +47,7 @@ from floatframe.results.sensors import (
     sensor_points,
 )
 from tests.bodies import STEEL, box_mesh
+from tests.floatframe.command import run_floatframe
 
 UNITS = unit_system("m-kg-s")
 SOFT = replace(STEEL, E=2.1e9)
@@ -277,7 +276,7 @@ def test_the_file_of_a_system_names_nodes_sets_and_elements_and_its_run_says_whi
     number = int(mesh.node_numbers[at((1.0, 0.0, 0.04), mesh)])
     cms.write(bars[0], tmp_path / "bar.h5")
     (tmp_path / "bar.toml").write_text(FILE.format(number=number))
-    done = CliRunner().invoke(app, ["run", str(tmp_path / "bar.toml"), "-o", str(tmp_path / "out.h5")])
+    done = run_floatframe("run", tmp_path / "bar.toml", "-o", tmp_path / "out.h5")
     assert done.exit_code == 0, done.output
     places = read_results(tmp_path / "out.h5").head.places
     assert places["tip"] == (f"node {number} at [1, 0, 0.04]",)
@@ -288,7 +287,7 @@ def test_the_file_of_a_system_names_nodes_sets_and_elements_and_its_run_says_whi
     assert "Places of sensors" in done.output
     assert str(number) in done.output
     (tmp_path / "bar.toml").write_text(FILE.format(number=number).replace("tolerance = 0.05", ""))
-    refused = CliRunner().invoke(app, ["run", str(tmp_path / "bar.toml"), "-o", str(tmp_path / "out.h5")])
+    refused = run_floatframe("run", tmp_path / "bar.toml", "-o", tmp_path / "out.h5")
     assert refused.exit_code != 0
     assert "keep" in refused.output
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from typer.testing import CliRunner
 
 from cms.body.modal_file.file import write
 from cms.body.stress import von_mises
@@ -25,7 +24,6 @@ from floatframe import (
     integrate,
     read_results,
 )
-from floatframe.cli.app import app
 from floatframe.errors import ModelError
 from floatframe.files.system_file.read_system import read_system
 from floatframe.joints import JointCoordinate
@@ -47,6 +45,7 @@ from floatframe.results.sensors import (
     measured,
     sensor_of,
 )
+from tests.floatframe.command import answer_of_floatframe, run_floatframe
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 from tests.floatframe.results.examples import BODY, RNG, TEXT
 
@@ -232,23 +231,17 @@ def spin(tmp_path):
     return path
 
 
-def run(*words, code=0):
-    result = CliRunner().invoke(app, [str(word) for word in words])
-    assert result.exit_code == code, result.output
-    return result.stdout if code == 0 else " ".join(result.stderr.split())
-
-
 def test_sensors_of_the_file_are_in_table_plot_and_record(spin):
-    text = run("run", spin)
+    text = answer_of_floatframe("run", spin)
     assert "largest stress largest" in text
     results = spin.with_suffix(".h5")
-    record = json.loads(run("info", results, "--json"))["sensors"]
+    record = json.loads(answer_of_floatframe("info", results, "--json"))["sensors"]
     system, _ = read_system(spin)
     motion = read_results(results)
     tip = measured(system, motion)["tip"]
     assert record["tip size"]["unit"] == "mm/s"
     assert_allclose(record["tip size"]["greatest"], tip.columns["size"].max(), rtol=1e-15)
-    run("export", results)
+    answer_of_floatframe("export", results)
     with open(spin.with_suffix(".csv"), newline="") as file:
         names, *rows = csv.reader(file)
     table = dict(zip(names, np.array(rows, dtype=float).T, strict=True))
@@ -256,25 +249,27 @@ def test_sensors_of_the_file_are_in_table_plot_and_record(spin):
     rate = JointCoordinate("hinge", "angle").measure(system, motion).rate
     assert_allclose(table["hinge.angle rate [rad/s]"], rate, rtol=0, atol=0)
     assert "largest stress largest [MPa]" in names
-    run("plot", results)
-    run("plot", results, "-s", "tip", "-s", "hinge.angle", "-o", spin.with_name("two.png"))
+    answer_of_floatframe("plot", results)
+    answer_of_floatframe("plot", results, "-s", "tip", "-s", "hinge.angle", "-o", spin.with_name("two.png"))
     assert spin.with_name("two.png").read_bytes().startswith(b"\x89PNG")
-    assert "did you mean 'hinge.angle'" in run("plot", results, "-s", "hinge.angel", code=2)
+    assert "did you mean 'hinge.angle'" in answer_of_floatframe("plot", results, "-s", "hinge.angel", code=2)
 
 
 def test_results_whose_system_file_has_gone_or_changed_are_still_shown(spin, caplog):
-    run("run", spin)
+    answer_of_floatframe("run", spin)
     results = spin.with_suffix(".h5")
     spin.write_text(TEXT.replace("[sensors.tip]", '[sensors.more]\ntype = "momentum"\n\n[sensors.tip]'))
-    assert "more linear size" in run("info", results)
+    assert "more linear size" in answer_of_floatframe("info", results)
     assert "has changed since the run" in caplog.text
     spin.write_text(TEXT.replace("hinge]", "axle]").replace('"hinge"', '"axle"'))
-    result = CliRunner().invoke(app, ["info", str(results)])
+    result = run_floatframe("info", results)
     assert result.exit_code == 0
     assert "note: sensors are omitted" in result.stderr
     spin.unlink()
-    assert "Sensors" not in run("info", results)
-    assert "system file of the run does not exist any more" in run("plot", results, "-s", "tip", code=2)
+    assert "Sensors" not in answer_of_floatframe("info", results)
+    assert "system file of the run does not exist any more" in answer_of_floatframe(
+        "plot", results, "-s", "tip", code=2
+    )
 
 
 @pytest.mark.parametrize(("old", "new", "words"), [
@@ -288,12 +283,14 @@ def test_results_whose_system_file_has_gone_or_changed_are_still_shown(spin, cap
 def test_mistakes_in_sensors_are_answered_with_key_and_choices(spin, old, new, words):
     assert TEXT.count(old) == 1
     spin.write_text(TEXT.replace(old, new))
-    assert words in run("run", spin, code=2)
+    assert words in answer_of_floatframe("run", spin, code=2)
 
 
 def test_film_is_coloured_by_stress_on_request(spin):
-    run("run", spin)
+    answer_of_floatframe("run", spin)
     results = spin.with_suffix(".h5")
-    run("animate", results, "--color", "von-mises", "--fps", "1", "--speed", "0.003", "-o", spin.with_name("film.gif"))
+    answer_of_floatframe(
+        "animate", results, "--color", "von-mises", "--fps", "1", "--speed", "0.003", "-o", spin.with_name("film.gif")
+    )
     assert spin.with_name("film.gif").read_bytes().startswith(b"GIF8")
-    assert "did you mean 'von-mises'" in run("animate", results, "--color", "von-mieses", code=2)
+    assert "did you mean 'von-mises'" in answer_of_floatframe("animate", results, "--color", "von-mieses", code=2)

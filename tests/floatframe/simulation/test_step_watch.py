@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
-from typer.testing import CliRunner
 
 import cms
 import fe_models
@@ -30,7 +29,6 @@ from floatframe import (
     integrate,
     read_results,
 )
-from floatframe.cli.app import app
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.kernels.memory import KINETIC, WORK_TAKEN, new_rows
 from floatframe.engine.kernels.work import new_work
@@ -55,6 +53,7 @@ from floatframe.simulation.step_watch import (
     Companion,
     StepWatch,
 )
+from tests.floatframe.command import run_floatframe
 
 GROUND = Marker("ground", position=np.zeros(3))
 
@@ -541,9 +540,9 @@ rho_inf = 0.5
 ])  # fmt: skip
 def test_the_command_line_prints_the_line_and_files_choose(tmp_path, more, words, says):
     (tmp_path / "swing.toml").write_text(SWING + more)
-    result = CliRunner().invoke(app, ["run", str(tmp_path / "swing.toml"), *words])
+    result = run_floatframe("run", tmp_path / "swing.toml", *words)
     assert result.exit_code == 0, result.output
-    told = json.loads(CliRunner().invoke(app, ["info", str(tmp_path / "swing.h5"), "--json"]).stdout)["validity"]
+    told = json.loads(run_floatframe("info", tmp_path / "swing.h5", "--json").stdout)["validity"]
     assert [note["kind"] for note in told] == ["steps"] * says
     assert ("Notes on the steps of the run" in result.output) == says
 

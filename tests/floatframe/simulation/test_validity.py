@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 from numpy.testing import assert_allclose
-from typer.testing import CliRunner
 
 import cms
 import fe_models as fm
@@ -26,7 +25,6 @@ from floatframe import (
     read_results,
     static_equilibrium,
 )
-from floatframe.cli.app import app
 from floatframe.components.mechanisms import slider_crank, spin_up_beam, spinning_shaft
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.kernels.entry import absolute_kernels
@@ -37,6 +35,7 @@ from floatframe.model.rotations import euler_parameters_of_rotation_vector
 from floatframe.model.state import State
 from floatframe.results.validity import ValidityNote, notes_from_json, notes_to_json
 from floatframe.simulation.validity_watch import ValidityWatch, estimated_interface_loads
+from tests.floatframe.command import run_floatframe
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffened_body, stiffness
 
 N_Q = 4
@@ -166,9 +165,9 @@ def test_notes_stand_in_the_summary_and_in_the_record(tmp_path):
     path = tmp_path / "spin.h5"
     integrate(spin_up_beam(soft_beam(), speed=30.0, duration=0.5, stiffening=False), GeneralizedAlpha(0.8), 0.5, 1e-3,
               output=path)  # fmt: skip
-    shown = CliRunner().invoke(app, ["info", str(path)])
+    shown = run_floatframe("info", path)
     assert "left the range of their linear frame" in shown.output
-    record = CliRunner().invoke(app, ["info", str(path), "--json"])
+    record = run_floatframe("info", path, "--json")
     assert '"kind": "load"' in record.output
     assert '"is_stiffened": false' in record.output
 

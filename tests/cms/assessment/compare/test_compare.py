@@ -8,7 +8,6 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
 from scipy.linalg import eigh
-from typer.testing import CliRunner
 
 import cms
 from cms.assessment.compare.compare import compare_sets, draw_modes, thinned_surface
@@ -35,13 +34,13 @@ from cms.assessment.quality.reduction_check import check_reduction
 from cms.assessment.quality.reference.full_reference import FullReference
 from cms.assessment.quality.reference.port_model import FrequencyResponse, port_model
 from cms.assessment.quality.reference.transient import Snapshots
-from cms.cli.app import app
 from cms.cli.verdicts.compare import parse_load
 from cms.errors import CompareError
 from cms.modes.families.families import Families
 from cms.modes.families.interface_loads import point_load
 from fe_models.body.load_cases import LoadCase
 from tests.bodies import bar, beam, box_mesh, chain
+from tests.cms.command import run_cms
 from tests.decks import JOB, write_deck
 
 LOADED = {"benfield-hruda": {"loads": [point_load("left", mass=2.0, inertia=0.01)]}}
@@ -435,7 +434,7 @@ def folder(tmp_path):
 
 
 def run(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in ("compare", *arguments)])
+    return run_cms("compare", *arguments)
 
 
 def test_the_command_writes_table_page_and_numbers_that_agree(folder, monkeypatch):

@@ -3,11 +3,11 @@ import json
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from typer.testing import CliRunner
 
-from cms.cli.app import app
 from cms.errors import JobError
 from cms.jobs.studies import MeshConvergence, mesh_convergence
+from tests.changed_file import changed_file
+from tests.cms.command import run_cms
 from tests.fe_models.small_solids import plate_file
 
 JOB = """
@@ -39,12 +39,7 @@ def job_file(tmp_path):
     plate_file(tmp_path / "plate.step")
 
     def write(*changes):
-        text = JOB
-        for old, new in changes:
-            assert old in text
-            text = text.replace(old, new)
-        (tmp_path / "plate.toml").write_text(text)
-        return tmp_path / "plate.toml"
+        return changed_file(tmp_path / "plate.toml", JOB, *changes)
 
     return write
 
@@ -74,11 +69,11 @@ def test_cells_of_first_order_have_no_less_error_than_their_report_finds(job_fil
 
 def test_the_command_says_sizes_and_errors(job_file):
     path = job_file()
-    run = CliRunner().invoke(app, ["converge", str(path), "--modes", "3", "--json"])
+    run = run_cms("converge", path, "--modes", "3", "--json")
     record = json.loads(run.stdout)
     assert record["sizes"] == [13.5, 9.0]
     assert len(record["estimated_error"]) == 3
-    words = CliRunner().invoke(app, ["converge", str(path), "--modes", "3"]).stdout
+    words = run_cms("converge", path, "--modes", "3").stdout
     assert "size 13.5 mm [Hz]" in words
     assert "the error is that of size 9 mm, estimated with order 1" in words
 

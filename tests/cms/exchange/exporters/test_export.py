@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import cms
 from cms.body.modal_file.file import convert_units
-from cms.cli.app import app
 from cms.errors import ExportError, ModalFileError, UnitsError
 from cms.exchange.export import WRITERS, export_body
 from fe_models.foundation.units import unit_system
+from tests.cms.command import run_cms
 from tests.cms.exchange.exporters.small_bodies import cloud_body
 from tests.synthetic import synthetic_reduced_body
 
@@ -29,7 +28,7 @@ def modal_file(tmp_path_factory, body):
 
 
 def run(*arguments):
-    return CliRunner().invoke(app, ["export", *[str(argument) for argument in arguments]])
+    return run_cms("export", *arguments)
 
 
 FLOATING = ("mbsim", "exudyn", "mbdyn", "sid_fem", "sid_fem-fembeam")

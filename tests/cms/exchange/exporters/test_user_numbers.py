@@ -6,11 +6,9 @@ import meshio
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from typer.testing import CliRunner
 
 import cms
 import fe_models as fm
-from cms.cli.app import app
 from cms.errors import BodyError
 from cms.exchange.export import export_body
 from cms.exchange.exporters.nodes import all_nodes
@@ -25,6 +23,7 @@ from fe_models.files.read_deck import parse_deck
 from fe_models.files.read_mesh import read_mesh
 from fe_models.foundation.units import unit_system
 from tests.bodies import STEEL, box_mesh
+from tests.cms.command import run_cms
 
 PLAIN = box_mesh(3, 1, 1, 1.0, 0.1, 0.1)
 CELLS = PLAIN.cells["hexahedron"]
@@ -191,7 +190,7 @@ def test_numbers_that_are_not_unique_are_not_used_and_said(reduced):
 
 def test_info_tells_numbers_sets_and_nodes_that_turn(reduced, tmp_path):
     cms.write(reduced, tmp_path / "bar.h5")
-    shown = CliRunner().invoke(app, ["info", str(tmp_path / "bar.h5")]).output
+    shown = run_cms("info", tmp_path / "bar.h5").output
     assert f"{len(NODE)}, from {NODE.min()} to {NODE.max()}" in shown
     assert "3, from 31 to 77" in shown
     assert "8 by elements" in shown

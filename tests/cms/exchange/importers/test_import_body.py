@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 from numpy.testing import assert_allclose
-from typer.testing import CliRunner
 
 import cms
-from cms.cli.app import app
 from cms.errors import BodyError, ForeignBodyError, UnitsError
 from cms.exchange.export import export_body
 from cms.exchange.importers.inertia import FullMass
@@ -20,6 +18,7 @@ from floatframe import GeneralizedAlpha, System, integrate
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.results.recovery import interface_positions
 from tests.bodies import bar
+from tests.cms.command import run_cms
 from tests.root import ROOT
 from tests.superelements import FIRST, craig_bampton_matrices
 
@@ -69,7 +68,7 @@ def test_its_recovery_moves_every_node_as_the_modes_of_a_beam_do(outboard):
 
 
 def test_units_are_asked_for(outboard):
-    result = CliRunner().invoke(app, ["import", str(outboard)])
+    result = run_cms("import", outboard)
     assert result.exit_code != 0
     assert "--units: missing; none of these formats says its units" in result.output.replace("\n", " ")
     with pytest.raises(UnitsError, match="unknown unit system"):
@@ -79,13 +78,13 @@ def test_units_are_asked_for(outboard):
 def test_the_command_writes_a_file_that_says_what_is_missing(outboard, tmp_path):
     path = tmp_path / "body.h5"
     words = ["import", str(outboard), "--units", "mm-kg-s", "--interface", "hub=11", "--interface", "tips=3", "-o"]
-    result = CliRunner().invoke(app, [*words, str(path)])
+    result = run_cms(*words, path)
     assert result.exit_code == 0, result.output
     assert "inertia missing" in result.output
     assert "exact, as far as they are known" in result.output
     body = cms.read(path)
     assert [i.name for i in body.interfaces] == ["hub", "tips"]
-    record = json.loads(CliRunner().invoke(app, ["check", str(path), "--json"]).output)
+    record = json.loads(run_cms("check", path, "--json").output)
     terms = next(r for r in (record["records"] if isinstance(record, dict) else record) if r["name"] == "inertia-terms")
     assert terms["verdict"] == "warn"
 
@@ -177,14 +176,14 @@ def test_matrices_without_rows_or_places_ask_for_them(tmp_path):
     ],
 )
 def test_options_that_are_wrong_are_told(outboard, words, told):
-    result = CliRunner().invoke(app, ["import", str(outboard), "--units", "mm-kg-s", *words])
+    result = run_cms("import", outboard, "--units", "mm-kg-s", *words)
     assert result.exit_code != 0
     assert told in " ".join(result.output.split())
 
 
 def test_a_damping_ratio_above_a_fifth_is_taken_if_it_is_confirmed(outboard, tmp_path):
     words = ["import", str(outboard), "--units", "mm-kg-s", "-o", str(tmp_path / "body.h5")]
-    result = CliRunner().invoke(app, [*words, "--damping", "0.3", "--heavy"])
+    result = run_cms(*words, "--damping", "0.3", "--heavy")
     assert result.exit_code == 0, result.output
     body, bare = cms.read(tmp_path / "body.h5"), cms.exchange.import_body(outboard, units="mm-kg-s")
     omega = np.sqrt(np.diag(body.K) * np.diag(body.M))
@@ -198,11 +197,11 @@ def test_a_table_of_nodal_masses_completes_a_superelement(outboard, tmp_path):
     table.write_text("node,mass\n" + "".join(f"{number},{share:.12g}\n" for number in body.node_ids))
     output = tmp_path / "whole.h5"
     words = ["import", str(outboard), "--units", "mm-kg-s", "--nodal-masses", str(table), "-o", str(output)]
-    result = CliRunner().invoke(app, words)
+    result = run_cms(*words)
     assert result.exit_code != 0  # equal masses are not those of this frame: its parts are of other sizes
     assert "do not belong to this body" in " ".join(result.output.split())
     table.write_text("node,mass\n3,1.0\nx\n")
-    result = CliRunner().invoke(app, words)
+    result = run_cms(*words)
     assert "masses.csv, line 3: expected node, mass" in " ".join(result.output.split())
 
 

@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import eigh
-from typer.testing import CliRunner
 
 import cms
 import fe_models
-from cms.cli.app import app
 from cms.errors import BodyError, JobError
 from cms.jobs.body_of_job import job_body, uncoupled_body
 from cms.jobs.decks.job_text import job_text
@@ -19,6 +17,7 @@ from fe_models.files.model_of_deck import DeckOptions
 from fe_models.files.read_deck import parse_deck
 from fe_models.foundation.stages import Stages
 from tests.bodies import STEEL, box_mesh
+from tests.cms.command import run_cms
 from tests.decks import write_deck
 
 MATERIAL = "*MATERIAL, NAME=STEEL\n*ELASTIC\n2.1e11, .3\n*DENSITY\n7850.\n"
@@ -168,20 +167,20 @@ def test_cells_of_a_deck_in_no_table_are_refused(tmp_path):
 
 def test_the_command_prints_the_ledger_and_writes_it_on_top(tmp_path):
     path = deck_of(tmp_path, "*BOUNDARY\nleft, 1, 3\n*CONTACT PAIR, INTERACTION=i\na, b\n")
-    run = CliRunner().invoke(app, ["job", str(path), "--units", "m-kg-s"])
+    run = run_cms("job", path, "--units", "m-kg-s")
     assert run.exit_code == 2
     assert not path.with_suffix(".toml").exists()
     assert "1 *CONTACT PAIR" in run.output
     assert '--leave-out "CONTACT PAIR"' in run.output
-    run = CliRunner().invoke(app, ["job", str(path), "--units", "m-kg-s", "--leave-out", "CONTACT PAIR"])
+    run = run_cms("job", path, "--units", "m-kg-s", "--leave-out", "CONTACT PAIR")
     assert run.exit_code == 0, run.output
     text = path.with_suffix(".toml").read_text()
     assert "#   1 *CONTACT PAIR: LEFT OUT ON REQUEST: contact is not linear" in text
     assert "# The deck holds ux uy uz at the interface left; here the body is free." in text
-    run = CliRunner().invoke(app, ["job", str(path)])
+    run = run_cms("job", path)
     assert run.exit_code == 2
     assert "--units: missing; a deck does not say its units; choices: " in run.output
-    assert CliRunner().invoke(app, ["reduce", str(path.with_suffix(".toml"))]).exit_code == 0
+    assert run_cms("reduce", path.with_suffix(".toml")).exit_code == 0
 
 
 def test_tables_of_a_deck_need_a_deck(tmp_path):

@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.sparse.linalg import splu
-from typer.testing import CliRunner
 
 import cms
-from cms.cli.app import app
 from cms.errors import FactorizationError, MemoryBudgetError
 from cms.linear_algebra.memory import budget
 from cms.linear_algebra.memory.budget import (
@@ -32,6 +30,7 @@ from cms.linear_algebra.sparse_cholesky.factor import CholeskyFactor
 from fe_models.foundation.tall.on_disk import is_on_disk
 from fe_models.foundation.threads import n_threads
 from tests.bodies import bar
+from tests.cms.command import run_cms
 from tests.cms.linear_algebra.sparse_cholesky.examples import grid
 
 
@@ -200,7 +199,7 @@ def test_a_job_takes_a_budget_and_gives_the_same_body(tmp_path):
 def test_the_command_refuses_budgets_that_do_not_do_and_writes_nothing(tmp_path, line, arguments, words):
     job = write_job(tmp_path, line)
     before = sorted(tmp_path.iterdir())
-    result = CliRunner().invoke(app, ["reduce", str(job), *arguments])
+    result = run_cms("reduce", job, *arguments)
     assert result.exit_code == 2, result.output
     assert re.search(re.escape(words), " ".join(result.output.split()))
     assert sorted(tmp_path.iterdir()) == before

@@ -2,10 +2,8 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 from numpy.testing import assert_allclose
-from typer.testing import CliRunner
 
 import cms
-from cms.cli.app import app
 from cms.errors import FactorizationError
 from cms.linear_algebra.solvers import registry
 from cms.linear_algebra.solvers.eigen import eigenmodes
@@ -15,6 +13,7 @@ from cms.linear_algebra.solvers.pardiso import mkl_runtime
 from cms.linear_algebra.solvers.registry import DEFAULTS, SOLVERS, solver_of
 from fe_models.foundation.solver import Solver
 from tests.bodies import bar
+from tests.cms.command import run_cms
 from tests.cms.linear_algebra.solvers.examples import clamped_bar
 
 
@@ -126,7 +125,7 @@ def solver_in(path):
 
 def test_the_command_goes_before_the_job_and_the_file_says_who_factorised(folder, registered):
     def reduced_by(*arguments):
-        result = CliRunner().invoke(app, ["reduce", *arguments, "-o", str(folder / "out.h5")])
+        result = run_cms("reduce", *arguments, "-o", folder / "out.h5")
         assert result.exit_code == 0, result.output
         return solver_in(folder / "out.h5")
 
@@ -155,7 +154,7 @@ def test_jobs_of_a_fleet_take_the_solver_too(folder, registered):
 def test_the_command_refuses_solvers_that_are_not_there_and_writes_nothing(tmp_path, registered, arguments, words):
     write_matrices(tmp_path)
     before = sorted(tmp_path.iterdir())
-    result = CliRunner().invoke(app, ["reduce", str(tmp_path / arguments[0]), *arguments[1:]])
+    result = run_cms("reduce", tmp_path / arguments[0], *arguments[1:])
     assert result.exit_code == 2
     assert words in " ".join(result.output.split())
     assert sorted(tmp_path.iterdir()) == before

@@ -21,20 +21,11 @@ from fe_models.elements.interfaces import NodeIndices, line_interface
 from fe_models.meshes.line_mesh import LineMesh
 from fe_models.meshes.numbering import Numbering
 from tests.bodies import STEEL, bar, with_interfaces
-from tests.cms.examples import TURNED, uneven_bar
+from tests.cms.command import run_cms
+from tests.cms.examples import FRAMES, uneven_bar
 from tests.cms.reduction.geometric_stiffness.examples import SI, bar_of_beams
 from tests.synthetic import synthetic_reduced_body
 
-FRAMES = {
-    "tisserand": TisserandFrame(),
-    "tisserand turned": TisserandFrame(origin=(0.2, -0.1, 0.3), axes=TURNED),
-    "buckens": BuckensFrame(),
-    "buckens turned": BuckensFrame(origin=(0.2, -0.1, 0.3), axes=TURNED),
-    "nodal left": NodalFrame("left"),
-    "nodal right": NodalFrame("right"),
-    "nodal right turned": NodalFrame("right", origin=(0.2, -0.1, 0.3), axes=TURNED),
-    "nodal": NodalFrame(),
-}
 SLACK = 1e-8  #: rounding of the static states times the condition of the change of frame
 
 
@@ -187,32 +178,26 @@ def test_coarse_shells_need_the_record(caplog):
 
 
 def test_the_command_carries_it_and_leaves_it_out_where_asked(tmp_path, made):
-    from typer.testing import CliRunner
-
-    from cms.cli.app import app
 
     cms.write(made["tisserand"], tmp_path / "bar.h5")
     command = ["frame", str(tmp_path / "bar.h5"), "--to", "buckens"]
-    result = CliRunner().invoke(app, command)
+    result = run_cms(*command)
     assert result.exit_code == 0, result.output
     assert_same(cms.read(tmp_path / "bar_buckens.h5"), made["buckens"])
     (tmp_path / "bar_buckens.h5").unlink()
-    result = CliRunner().invoke(app, [*command, "--no-geometric-stiffness"])
+    result = run_cms(*command, "--no-geometric-stiffness")
     assert result.exit_code == 0, result.output
     assert cms.read(tmp_path / "bar_buckens.h5").geometric is None
 
 
 def test_a_file_of_an_older_version_keeps_its_matrices_and_refuses(tmp_path, made):
     """As a program wrote it that knew no loads spread over the nodes; the command leaves nothing behind."""
-    from typer.testing import CliRunner
-
-    from cms.cli.app import app
 
     unnumbered = replace(made["tisserand"], numbering=Numbering())
     cms.write(as_before_version_4(unnumbered), tmp_path / "bar.h5")
     assert (tmp_path / "bar.h5").read_bytes().startswith(b"floatframe modal-file 2\n")
     assert cms.read(tmp_path / "bar.h5").geometric.spread is None
-    refused = CliRunner().invoke(app, ["frame", str(tmp_path / "bar.h5"), "--to", "buckens"])
+    refused = run_cms("frame", tmp_path / "bar.h5", "--to", "buckens")
     assert refused.exit_code != 0
     assert not (tmp_path / "bar_buckens.h5").exists()
     cms.write(unnumbered, tmp_path / "bar.h5")

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 import scipy.io
 from numpy.testing import assert_allclose
-from typer.testing import CliRunner
 
 import cms
-from cms.cli.app import app
 from cms.errors import RecoveryError
 from cms.reduction.recovery.files import write_recovery
 from cms.reduction.recovery.load_columns import forces_of_loads
+from tests.cms.command import run_cms
 from tests.cms.reduction.recovery.examples import reduced
 
 JOB = """
@@ -66,7 +65,7 @@ def folder(tmp_path_factory):
 
 
 def run(*words, code=0):
-    result = CliRunner().invoke(app, [str(word) for word in words])
+    result = run_cms(*words)
     assert result.exit_code == code, result.output
     return result.output
 

@@ -10,6 +10,7 @@ from fe_models.assembly.tables.shells import shell_properties
 from fe_models.body import OrthotropicMaterial
 from fe_models.errors import MaterialError
 from tests.bodies import box_mesh
+from tests.changed_file import changed_file
 
 JOB = """
 [body]
@@ -37,12 +38,7 @@ def job_file(tmp_path):
     meshio.write(tmp_path / "box.vtk", meshio.Mesh(mesh.nodes, [("hexahedron", mesh.cells["hexahedron"])]))
 
     def write(*changes):
-        text = JOB
-        for old, new in changes:
-            assert old in text
-            text = text.replace(old, new)
-        (tmp_path / "box.toml").write_text(text)
-        return tmp_path / "box.toml"
+        return changed_file(tmp_path / "box.toml", JOB, *changes)
 
     return write
 

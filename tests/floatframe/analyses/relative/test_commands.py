@@ -5,9 +5,8 @@ import json
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from typer.testing import CliRunner
 
-from floatframe.cli.app import app
+from tests.floatframe.command import run_floatframe
 
 ARM = """
 [system]
@@ -42,7 +41,7 @@ RUN = '\n[run]\nt_end = 1.0\nh = 1e-2\nformulation = "relative"\n'
 
 
 def run(*words):
-    result = CliRunner().invoke(app, [str(word) for word in words])
+    result = run_floatframe(*words)
     assert result.exit_code == 0, result.output
     return result.output
 
@@ -80,6 +79,6 @@ def test_equilibria_and_modes_do_not_depend_on_the_formulation(arm):
 
 
 def test_a_formulation_that_is_none_is_refused(arm):
-    result = CliRunner().invoke(app, ["modes", str(arm / "arm.toml"), "--formulation", "relatve"])
+    result = run_floatframe("modes", arm / "arm.toml", "--formulation", "relatve")
     assert result.exit_code != 0
     assert "did you mean 'relative'" in result.output

@@ -3,13 +3,12 @@
 import json
 
 import pytest
-from typer.testing import CliRunner
 
 import floatframe as ff
-from floatframe.cli.app import app
 from floatframe.design.generation.generate import LANGUAGES
 from floatframe.design.generation.routines import ROUTINES
 from floatframe.files.system_file.read_system import read_system
+from tests.floatframe.command import run_floatframe
 from tests.floatframe.design.generation.examples import PENDULUM
 
 
@@ -21,7 +20,7 @@ def pendulum(tmp_path):
 
 
 def called(*words):
-    return CliRunner().invoke(app, ["export", *map(str, words)])
+    return run_floatframe("export", *words)
 
 
 def test_the_command_writes_what_the_function_returns(pendulum, tmp_path):

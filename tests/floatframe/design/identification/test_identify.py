@@ -6,10 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from typer.testing import CliRunner
 
 from floatframe import read_system
-from floatframe.cli.app import app
 from floatframe.design.identification import linear_form, tree_samples
 from floatframe.design.identification.estimation import Measured, estimate
 from floatframe.design.identification.excitation import ExcitingMotion
@@ -17,6 +15,7 @@ from floatframe.design.identification.measured_file import read_measured
 from floatframe.design.identification.next_motion import next_motion
 from floatframe.design.identification.physical import real_parameters
 from floatframe.errors import ModelError
+from tests.floatframe.command import run_floatframe
 
 ROBOT = """
 [system]
@@ -87,7 +86,7 @@ def test_the_command_finds_the_parameters_and_writes_page_and_json(robot):
     page, record, motion = robot / "report.html", robot / "report.json", robot / "next.csv"
     words = [str(robot / "robot.toml"), str(robot / "measured.csv"), "-o", str(page), "-o", str(record)]
     words += ["--motion", str(motion)]
-    made = CliRunner().invoke(app, ["identify", *words, "--cutoff", "10", "--check", str(robot / "other.csv")])
+    made = run_floatframe("identify", *words, "--cutoff", "10", "--check", robot / "other.csv")
     assert made.exit_code == 0, made.output
     found = json.loads(record.read_text())
     named = {each["name"]: each for each in found["parameters"]}

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import least_squares, minimize, minimize_scalar
-from typer.testing import CliRunner
 
 from floatframe import linearize, read_system
-from floatframe.cli.app import app
 from floatframe.cli.fits import best_system
 from floatframe.design import optimize, read_design
 from floatframe.design.optimization.design import Quantity
@@ -17,6 +15,7 @@ from floatframe.design.optimization.evaluation import EvaluationFunction, respon
 from floatframe.design.studies.study_file import Output
 from floatframe.errors import SystemFileError
 from floatframe.machines import copy_machine
+from tests.floatframe.command import run_floatframe
 
 MU = 0.1
 TRACK, RATIO, ARM = 1.4, 0.56, -0.15  #: between kingpins, over the wheelbase, arms behind the kingpins
@@ -192,7 +191,7 @@ def test_best_values_in_a_base_file_are_written_into_the_file_that_results(copie
 
 def test_a_system_is_not_written_away_from_the_files_that_it_names(copied):
     folder = copied("absorber")
-    refused = CliRunner().invoke(app, ["optimize", str(folder / "peak.toml"), "-o", str(folder.parent / "best.toml")])
+    refused = run_floatframe("optimize", folder / "peak.toml", "-o", folder.parent / "best.toml")
     assert refused.exit_code == 2
     assert "expected the folder of" in " ".join(refused.stderr.split())
 

@@ -6,12 +6,11 @@ import json
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from typer.testing import CliRunner
 
-from floatframe.cli.app import app
 from floatframe.design import optimize, read_design
 from floatframe.errors import ModelError, ResultsError, SystemFileError
 from tests.floatframe.cli.examples import PENDULUM
+from tests.floatframe.command import answer_of_floatframe
 
 FOUR_BAR = """
 [system]
@@ -222,9 +221,7 @@ def frequency(d):
 
 
 def command(*words, code=0):
-    result = CliRunner().invoke(app, ["optimize", *(str(word) for word in words)])
-    assert result.exit_code == code, result.output
-    return result.stdout if code == 0 else " ".join(result.stderr.split())
+    return answer_of_floatframe("optimize", *words, code=code)
 
 
 def test_bars_of_a_four_bar_linkage_are_found_from_points_of_its_path(folder):

@@ -8,17 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from typer.testing import CliRunner
 
 from fe_models.foundation.toml_file import FileContent, changed
 from floatframe import GeneralizedAlpha, integrate
-from floatframe.cli.app import app
 from floatframe.design.studies.study import run_study
 from floatframe.design.studies.study_file import read_study
 from floatframe.errors import SystemFileError
 from floatframe.files.system_file.read_system import read_system
 from floatframe.results.sensors import measured
 from tests.floatframe.cli.examples import PENDULUM
+from tests.floatframe.command import answer_of_floatframe
 
 SENSOR = '\n[sensors.tip]\ntype = "velocity"\nbody = "rod"\nmarker = [1, 0, 0]\n'
 STUDY = """
@@ -49,9 +48,7 @@ def folder(tmp_path):
 
 
 def sweep(*words, code=0):
-    result = CliRunner().invoke(app, ["sweep", *(str(word) for word in words)])
-    assert result.exit_code == code, result.output
-    return result.stdout if code == 0 else " ".join(result.stderr.split())
+    return answer_of_floatframe("sweep", *words, code=code)
 
 
 def swing_of(mass, g):

@@ -8,11 +8,9 @@ import meshio
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from typer.testing import CliRunner
 
 from cms.body.modal_file.file import write
 from floatframe import read_results
-from floatframe.cli.app import app
 from floatframe.durability.fatigue import assess, basquin_curve, equivalent_repeats, history_damage, read_fatigue
 from floatframe.durability.fatigue.criteria import Criterion
 from floatframe.durability.fatigue.load_blocks import LoadBlock, block_of_results
@@ -22,6 +20,7 @@ from floatframe.durability.fatigue.report import cycles_at, exceedances
 from floatframe.durability.fatigue.spectral.spectra import spectra_of_history
 from floatframe.durability.fatigue.surface_damage import spectral_damage
 from floatframe.errors import FatigueError
+from tests.floatframe.command import answer_of_floatframe
 from tests.floatframe.results.examples import BODY, TEXT
 
 FATIGUE = """
@@ -56,19 +55,13 @@ repeats = 40
 FLEXIBLE = "part"
 
 
-def run(*words, code=0):
-    result = CliRunner().invoke(app, [str(word) for word in words])
-    assert result.exit_code == code, result.output
-    return result.stdout if code == 0 else " ".join(result.stderr.split())
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """A motion, its modal file, and a curve through the greatest stress of the motion at a thousand cycles."""
     path = tmp_path_factory.mktemp("fatigue")
     write(BODY, path / "part.h5")
     (path / "spin.toml").write_text(TEXT)
-    run("run", path / "spin.toml")
+    answer_of_floatframe("run", path / "spin.toml")
     return path
 
 
@@ -158,12 +151,12 @@ def test_factors_and_ranges_by_hand(file, amplitude):
 
 def test_what_is_written_holds_the_same_numbers(file, folder):
     made = assess(read_fatigue(file))
-    text = run("fatigue", file)
+    text = answer_of_floatframe("fatigue", file)
     worst = int(made.result.worst()[0])
     name = BODY.node_name(int(made.result.nodes[worst]))
     assert name in text
     record = json.loads((folder / "job.json").read_text())
-    assert record == json.loads(run("fatigue", file, "--json"))
+    assert record == json.loads(answer_of_floatframe("fatigue", file, "--json"))
     assert record["worst"][0]["node"] == name
     assert_allclose(record["worst"][0]["life"], 30 / made.result.damage[worst], rtol=1e-12)
     with open(folder / "job.csv", newline="") as table:
@@ -199,11 +192,11 @@ def test_spectra_of_a_file(file, folder, amplitude):
     curve = basquin_curve(amplitude, 1e6, 5, least_cycles=1)
     expected = spectral_damage(BODY, [replace(spectra, duration=60.0, scale=1e-5, mean=None)], curve, extrapolate=True)
     assert_allclose(made.result.damage, expected.damage, rtol=1e-12)
-    assert "spectral, dirlik" in run("fatigue", folder / "noise.toml", "--json")
+    assert "spectral, dirlik" in answer_of_floatframe("fatigue", folder / "noise.toml", "--json")
     (folder / "noise.toml").write_text(text + '[[spectra]]\nfile = "noise.npz"\n')
-    assert "the duration is not known" in run("fatigue", folder / "noise.toml", code=2)
+    assert "the duration is not known" in answer_of_floatframe("fatigue", folder / "noise.toml", code=2)
     np.savez(folder / "noise.npz", spectra=spectra.spectra)
-    assert "frequencies missing" in run("fatigue", folder / "noise.toml", code=2)
+    assert "frequencies missing" in answer_of_floatframe("fatigue", folder / "noise.toml", code=2)
 
 
 def test_a_measured_event_is_so_many_passes():
@@ -240,7 +233,7 @@ def test_a_measured_event_is_so_many_passes():
 def test_faults_of_the_file_are_named(file, old, new, words):
     changed(file, old, new)
     if words:
-        assert words in run("fatigue", file, code=2)
+        assert words in answer_of_floatframe("fatigue", file, code=2)
     else:
         assert read_fatigue(file).material.sn.survival == 0.9
 
@@ -248,7 +241,7 @@ def test_faults_of_the_file_are_named(file, old, new, words):
 def test_blocks_and_spectra_together_are_refused(file):
     text = file.read_text().partition("[[blocks]]")[0]
     file.write_text(text)
-    assert "expected [[blocks]] or [[spectra]], got neither" in run("fatigue", file, code=2)
+    assert "expected [[blocks]] or [[spectra]], got neither" in answer_of_floatframe("fatigue", file, code=2)
 
 
 def test_cycles_beyond_the_curve_are_told_when_they_are_counted(file):
@@ -262,13 +255,13 @@ def test_cycles_beyond_the_curve_are_told_when_they_are_counted(file):
 def test_a_strength_that_is_reached_is_refused_even_when_extrapolating(file, amplitude):
     changed(file, f"tensile_strength = {100 * amplitude}", f"tensile_strength = {1e-6 * amplitude}")
     changed(file, "negligible = 0.0", "extrapolate = true")
-    assert "the mean stress of a cycle is no less than the strength" in run("fatigue", file, code=2)
+    assert "the mean stress of a cycle is no less than the strength" in answer_of_floatframe("fatigue", file, code=2)
 
 
 def test_another_modal_file_than_that_of_the_run_is_refused(file, folder):
     write(replace(BODY, stress=2 * BODY.stress), folder / "other.h5")
     changed(file, 'body = "part.h5"', 'body = "other.h5"')
-    assert "was computed with another modal file" in run("fatigue", file, code=2)
+    assert "was computed with another modal file" in answer_of_floatframe("fatigue", file, code=2)
 
 
 def test_a_body_without_stress_or_surface_says_so():
@@ -309,6 +302,6 @@ def test_coarse_output_is_told(amplitude):
 def test_a_motion_in_other_units_than_the_body_does_the_same_damage(file, folder):
     expected = assess(read_fatigue(file)).result.damage
     (folder / "metres.toml").write_text(TEXT.replace('"mm-t-s"', '"m-kg-s"'))
-    run("run", folder / "metres.toml")
+    answer_of_floatframe("run", folder / "metres.toml")
     changed(file, 'results = "spin.h5"', 'results = "metres.h5"')
     assert_allclose(assess(read_fatigue(file)).result.damage, expected, rtol=1e-5)

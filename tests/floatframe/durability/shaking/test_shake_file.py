@@ -7,16 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from typer.testing import CliRunner
 
 import cms
 import floatframe as ff
 from fe_models.foundation.documents.html import html_page
-from floatframe.cli.app import app
 from floatframe.durability.shaking.page import shake_document
 from floatframe.durability.shaking.record import light_record, shake_record, shake_table, size_of_curves
 from floatframe.errors import SystemFileError
 from tests.bodies import bar
+from tests.floatframe.command import run_floatframe
 
 FILE = """
 body = "bar.h5"
@@ -82,7 +81,7 @@ def result(folder):
 
 
 def test_the_command_writes_page_record_and_table(folder):
-    found = CliRunner().invoke(app, ["shake", str(folder / "bar.toml")])
+    found = run_floatframe("shake", folder / "bar.toml")
     assert found.exit_code == 0, found.output
     assert "1 g = 9.80665 m/s²" in found.output
     record = json.loads((folder / "bar.shake.json").read_text())
@@ -104,7 +103,7 @@ def test_the_command_writes_page_record_and_table(folder):
 
 def test_the_options_of_a_modal_file_make_the_same_run(folder):
     options = ["--base", "left", "--Q", "25", "--sine", "5:1,100:1", "--rate", "4", "--directions", "z", "--json"]
-    found = CliRunner().invoke(app, ["shake", str(folder / "bar.h5"), *options])
+    found = run_floatframe("shake", folder / "bar.h5", *options)
     assert found.exit_code == 0, found.output
     own = {row["output"]: row["value"] for row in json.loads(found.stdout)["table"]}
     job = ff.durability.shaking.shake(ff.durability.shaking.read_shake(folder / "bar.toml"))
@@ -141,7 +140,7 @@ def test_a_long_record_has_its_curves_in_a_file_of_arrays(folder, result, monkey
     monkeypatch.setattr("floatframe.durability.shaking.record.MOST_NUMBERS", n)
     assert light_record(record, "a.npz") == (record, {})  # few numbers stay
     monkeypatch.setattr("floatframe.durability.shaking.record.MOST_NUMBERS", 1000)
-    found = CliRunner().invoke(app, ["shake", str(folder / "bar.toml"), "-o", str(folder / "long.json")])
+    found = run_floatframe("shake", folder / "bar.toml", "-o", folder / "long.json")
     assert found.exit_code == 0, found.output
     assert "long.npz" in found.output
     light = json.loads((folder / "long.json").read_text())
@@ -225,7 +224,7 @@ def test_bad_files_are_refused_in_words(folder, old, new, words):
     assert old in text
     path = Path(folder / "bad.toml")
     path.write_text(text.replace(old, new))
-    found = CliRunner().invoke(app, ["shake", str(path), "-o", str(folder / "bad.csv")])
+    found = run_floatframe("shake", path, "-o", folder / "bad.csv")
     assert found.exit_code == 2, found.output
     assert words in found.output
     assert not (folder / "bad.csv").exists()

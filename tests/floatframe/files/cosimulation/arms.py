@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import cms
+from tests.changed_file import changed_file
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 
 JUMPS = (0.0, 0.05, 0.1)
@@ -95,14 +96,8 @@ tolerance = {TOLERANCE}
 
 def write_arm(folder: Path, *changes: tuple[str, str]) -> Path:
     """Write the system file, with parts of its text changed, and the modal file beside it."""
-    text = ARM
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new, 1)
     cms.write(reduced_body(random_point_masses(3, 3), stiffness(3), name="load"), folder / "load.h5")
-    path = folder / "arm.toml"
-    path.write_text(text)
-    return path
+    return changed_file(folder / "arm.toml", ARM, *changes)
 
 
 def motor_at(t: float) -> float:

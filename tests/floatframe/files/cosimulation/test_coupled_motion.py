@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import expm
-from typer.testing import CliRunner
 
 from floatframe import integrate, read_results, read_system
-from floatframe.cli.app import app
 from floatframe.errors import CosimulationError, FloatframeError, ModelError
 from floatframe.files import co_simulate
 from floatframe.files.cosimulation.archive import write_fmu
 from floatframe.simulation import Coupling, ForeignUnit
+from tests.floatframe.command import run_floatframe
 from tests.floatframe.files.cosimulation.two_masses import T_END, X1, D, K, M, error, exact, write_two_masses
 
 SPAN = 0.2
@@ -84,7 +83,7 @@ def test_the_command_runs_it_and_writes_every_so_many_steps(two_masses, tmp_path
     text = two_masses.read_text().replace(f"t_end = {T_END}", "t_end = 0.1\noutput_every = 4")
     path = two_masses.with_name("often.toml")
     path.write_text(text)
-    result = CliRunner().invoke(app, ["run", str(path), "-o", str(tmp_path / "motion.h5")])
+    result = run_floatframe("run", path, "-o", tmp_path / "motion.h5")
     assert result.exit_code == 0, result.output
     motion = read_results(tmp_path / "motion.h5")
     assert motion.is_complete

@@ -12,15 +12,14 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 from numpy.testing import assert_allclose
-from typer.testing import CliRunner
 
 from fe_models.foundation.units import unit_system
 from floatframe import integrate, read_system
-from floatframe.cli.app import app
 from floatframe.errors import ModelError, SystemFileError
 from floatframe.files.cosimulation.archive import write_fmu
 from floatframe.files.cosimulation.model_description import BaseUnit, base_unit
 from floatframe.sensors import measured
+from tests.floatframe.command import run_floatframe
 from tests.floatframe.files.cosimulation.arms import JUMPS, MACRO, MOTORS, T_END, TOLERANCE, H, write_arm
 
 ROOT = Path(__file__).resolve().parents[4]
@@ -210,7 +209,7 @@ def test_time_is_in_seconds_whatever_the_units_of_the_system(tmp_path):
 def test_the_command_writes_what_fmpy_runs(arm, tmp_path):
     path = tmp_path / "arm.fmu"
     words = ["export", arm, "-o", path, "--fmi", 3, "--input", MOTOR, "--out", "hinge.angle"]
-    result = CliRunner().invoke(app, [str(word) for word in (*words, "--parameter", "m=bodies.arm.mass")])
+    result = run_floatframe(*words, "--parameter", "m=bodies.arm.mass")
     assert result.exit_code == 0, result.output
     assert "FMI 3.0 for x86_64-linux, x86_64-windows; it needs Python with floatframe" in result.output
     assert [v.name for v in fmpy.read_model_description(str(path)).modelVariables][:3] == ["time", "m", MOTOR]

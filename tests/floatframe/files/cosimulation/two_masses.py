@@ -15,6 +15,7 @@ from scipy.linalg import expm
 from floatframe import read_system
 from floatframe.files import co_simulate
 from floatframe.simulation import Coupling
+from tests.changed_file import changed_file
 
 M, K, D, KC, DC, T_END = 1.0, 100.0, 0.4, 60.0, 0.6, 1.0
 X1 = 0.1  #: of mass 1 at the start
@@ -117,13 +118,7 @@ def write_two_masses(folder: Path, *changes: tuple[str, str], can_go_back: bool 
     FmuBuilder.build_FMU(script, dest=folder / "second.fmu", canGetAndSetFMUstate=can_go_back)
     sys.modules.pop("second_mass", None)
     sys.path[:] = [each for each in sys.path if Path(each) != folder]
-    text = FILE
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new, 1)
-    path = folder / "first.toml"
-    path.write_text(text)
-    return path
+    return changed_file(folder / "first.toml", FILE, *changes)
 
 
 def exact(t):

@@ -6,12 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from typer.testing import CliRunner
 
 from cms.body.modal_file.file import write
 from floatframe import read_results, read_system, static_equilibrium
 from floatframe.analyses import consistent_state
-from floatframe.cli.app import app
 from floatframe.errors import UrdfError
 from floatframe.files.importers.read_urdf import read_urdf
 from floatframe.files.importers.robot_system import FlexibleLink, robot_system
@@ -19,16 +17,13 @@ from floatframe.files.importers.system_robot import robot_of_system
 from floatframe.files.importers.system_tables import write_system
 from floatframe.model.bodies.mode_choice import frozen_to_rigid
 from floatframe.model.rotations import rotation_exp, rotation_matrix
+from tests.floatframe.command import run_floatframe
 from tests.floatframe.files.importers.flexible_arm import ARM, EI, GRAVITY, LENGTH, RHO_A, TIP_MASS, beam_body
-
-
-def run(*words):
-    return CliRunner().invoke(app, [str(word) for word in words])
 
 
 def test_the_written_folder_is_the_same_system_and_runs(gripper, tmp_path):
     folder = tmp_path / "out"
-    result = run("import", gripper, "-o", folder, "--at", "slide=0.2", "--at", "knuckle=0.1")
+    result = run_floatframe("import", gripper, "-o", folder, "--at", "slide=0.2", "--at", "knuckle=0.1")
     assert result.exit_code == 0, result.output
     assert "note: 2 × <gazebo> not read" in result.stderr
     system, options = read_system(folder / "gripper.toml")
@@ -44,19 +39,19 @@ def test_the_written_folder_is_the_same_system_and_runs(gripper, tmp_path):
     assert options.t_end == 1.0
     file = folder / "gripper.toml"
     file.write_text(file.read_text().replace("t_end = 1.0", "t_end = 0.02"))
-    result = run("run", file, "-o", folder / "out.h5")
+    result = run_floatframe("run", file, "-o", folder / "out.h5")
     assert result.exit_code == 0, result.output
     assert read_results(folder / "out.h5").is_complete
 
 
 def test_a_system_file_becomes_a_description_with_the_same_dynamics(gripper, tmp_path):
-    run("import", gripper, "-o", tmp_path / "out", "--keep-fixed")
-    result = run("export", tmp_path / "out" / "gripper.toml", "-o", tmp_path / "back" / "g.urdf")
+    run_floatframe("import", gripper, "-o", tmp_path / "out", "--keep-fixed")
+    result = run_floatframe("export", tmp_path / "out" / "gripper.toml", "-o", tmp_path / "back" / "g.urdf")
     assert result.exit_code == 2
     assert "URDF requires limits of a prismatic joint; effort, velocity not given" in result.stderr
     assert not (tmp_path / "back").exists()
-    result = run("export", tmp_path / "out" / "gripper.toml", "-o", tmp_path / "back" / "g.urdf", "--effort", 9,
-                 "--velocity", 2)  # fmt: skip
+    gripper, urdf = tmp_path / "out" / "gripper.toml", tmp_path / "back" / "g.urdf"
+    result = run_floatframe("export", gripper, "-o", urdf, "--effort", 9, "--velocity", 2)
     assert result.exit_code == 0, result.output
     assert "note: omitted: gravity" in result.stderr
     assert (tmp_path / "back" / "meshes" / "finger_0.stl").is_file()
@@ -65,11 +60,11 @@ def test_a_system_file_becomes_a_description_with_the_same_dynamics(gripper, tmp
 
 
 def test_info_tells_links_and_joints(gripper):
-    record = json.loads(run("info", gripper, "--json").stdout)
+    record = json.loads(run_floatframe("info", gripper, "--json").stdout)
     assert (record["root"], record["freedoms"], record["mass"]) == ("world", 2, 2.5)
     assert record["links"][1]["pictures"] == ["cylinder", "box"]
     assert record["joints"][2]["follows"] == "knuckle"
-    text = run("info", gripper).stdout
+    text = run_floatframe("info", gripper).stdout
     for words in ("gripper", "-0.1 to 0.5", "knuckle", "package://hand/meshes/tip.stl", "2 × <gazebo> not read"):
         assert words in text
 
@@ -85,7 +80,7 @@ def test_info_tells_links_and_joints(gripper):
     ],
 )
 def test_bad_options_write_nothing(gripper, tmp_path, words, message):
-    result = run("import", gripper, "-o", tmp_path / "out", *words)
+    result = run_floatframe("import", gripper, "-o", tmp_path / "out", *words)
     assert result.exit_code == 2
     assert message in result.stderr
     assert not (tmp_path / "out").exists()

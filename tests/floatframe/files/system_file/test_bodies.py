@@ -11,6 +11,7 @@ from floatframe.files.system_file.read_system import read_system
 from floatframe.model import AddedMass, with_masses
 from floatframe.model.bodies.mass_properties import combined, mass_properties, point_mass
 from floatframe.model.bodies.mode_choice import frozen_to_rigid, with_modes, without_modes
+from tests.changed_file import changed_file
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 
 FILE = """
@@ -72,13 +73,7 @@ def write(tmp_path, rod):
     cms.write(rod, tmp_path / "rod.h5")
 
     def written(*changes):
-        text = FILE
-        for old, new in changes:
-            assert old in text
-            text = text.replace(old, new, 1)
-        path = tmp_path / "bodies.toml"
-        path.write_text(text)
-        return path
+        return changed_file(tmp_path / "bodies.toml", FILE, *changes)
 
     return written
 

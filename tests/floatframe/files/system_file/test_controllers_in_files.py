@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from typer.testing import CliRunner
 
 import floatframe as ff
-from floatframe.cli.app import app
 from floatframe.files.system_file.read_system import read_system
+from tests.floatframe.command import run_floatframe
 
 ROTOR = """
 [system]
@@ -86,7 +85,7 @@ def in_python(system, kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_controller_of_a_file_is_that_of_python(folder, kind):
     path = written(folder, KINDS[kind])
-    result = CliRunner().invoke(app, ["run", str(path)])
+    result = run_floatframe("run", path)
     assert result.exit_code == 0, result.output
     found, expected = ff.read_results(path.with_suffix(".h5")), in_python(read_system(path)[0], kind)
     assert np.abs(expected.joint("pin").angle).max() > 1e-2
@@ -118,7 +117,7 @@ def test_a_run_that_was_interrupted_is_resumed_by_the_command(folder, kind, monk
     results = path.with_suffix(".h5")
     with pytest.raises(KeyboardInterrupt):
         ff.integrate(system, ff.GeneralizedAlpha(), 0.3, 1e-3, output=results, batch_steps=50, progress=interrupt)
-    result = CliRunner().invoke(app, ["resume", str(path)])
+    result = run_floatframe("resume", path)
     assert result.exit_code == 0, result.output
     assert_array_equal(ff.read_results(results).joint("pin").angle, whole.joint("pin").angle)
 

@@ -15,6 +15,7 @@ from floatframe.joints import AxialDistance, CoordinateCoupler, JointCoordinate,
 from floatframe.model.functions.time_functions import harmonic, table
 from floatframe.results import coupler_motion, user_force_motion
 from floatframe.sensors import ControlSensor, CouplerSensor, measured
+from tests.changed_file import changed_file
 
 MACHINE = """
 [system]
@@ -133,13 +134,7 @@ h = 1e-3
 @pytest.fixture
 def write(tmp_path):
     def written(*changes):
-        text = MACHINE
-        for old, new in changes:
-            assert old in text
-            text = text.replace(old, new, 1)
-        path = tmp_path / "machine.toml"
-        path.write_text(text)
-        return path
+        return changed_file(tmp_path / "machine.toml", MACHINE, *changes)
 
     return written
 

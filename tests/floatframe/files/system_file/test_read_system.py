@@ -16,6 +16,7 @@ from floatframe.integrators import hht, newmark, trapezoidal
 from floatframe.model.joints import JOINTS
 from floatframe.model.rotations import euler_parameters_of_rotation_vector
 from floatframe.simulation import Event
+from tests.changed_file import changed_file
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 
 SWING = """
@@ -80,13 +81,7 @@ def write(tmp_path):
     cms.write(reduced_body(random_point_masses(3, 3), stiffness(3), name="rod"), tmp_path / "rod.h5")
 
     def written(*changes):
-        text = SWING
-        for old, new in changes:
-            assert old in text
-            text = text.replace(old, new, 1)
-        path = tmp_path / "swing.toml"
-        path.write_text(text)
-        return path
+        return changed_file(tmp_path / "swing.toml", SWING, *changes)
 
     return written
 

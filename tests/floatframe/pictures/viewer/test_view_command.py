@@ -1,17 +1,12 @@
 """The command `floatframe view`: what it writes, and its messages."""
 
 import pytest
-from typer.testing import CliRunner
 
 from cms.body.modal_file.file import write
-from floatframe.cli.app import app
 from tests.floatframe.cli.examples import FLEXIBLE, PENDULUM, RIGID
+from tests.floatframe.command import run_floatframe
 from tests.floatframe.pictures.viewer.pages import ReadPage
 from tests.synthetic import synthetic_reduced_body
-
-
-def run(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 @pytest.fixture(scope="module")
@@ -19,12 +14,12 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("view")
     (folder / "swing.toml").write_text(RIGID + '\n[[bodies.stick.shapes]]\ntype = "box"\nsize = [1.0, 0.1, 0.1]\n')
     (folder / "pendulum.toml").write_text(PENDULUM)
-    assert run("run", folder / "swing.toml").exit_code == 0
+    assert run_floatframe("run", folder / "swing.toml").exit_code == 0
     return folder
 
 
 def test_a_page_stands_beside_the_results_and_the_command_says_what_it_leaves_out(folder):
-    result = run("view", folder / "swing.h5")
+    result = run_floatframe("view", folder / "swing.h5")
     assert result.exit_code == 0, result.output
     assert "interpolated linearly" in result.output
     read = ReadPage(folder / "swing.html")
@@ -33,9 +28,9 @@ def test_a_page_stands_beside_the_results_and_the_command_says_what_it_leaves_ou
 
 
 def test_a_system_file_gives_its_modes_or_its_equilibrium(folder):
-    assert run("view", folder / "pendulum.toml").exit_code == 0
+    assert run_floatframe("view", folder / "pendulum.toml").exit_code == 0
     assert ReadPage(folder / "pendulum.html").record["kind"] == "modes"
-    assert run("view", folder / "pendulum.toml", "--rest", "-o", folder / "rest.html").exit_code == 0
+    assert run_floatframe("view", folder / "pendulum.toml", "--rest", "-o", folder / "rest.html").exit_code == 0
     assert ReadPage(folder / "rest.html").record["facts"][0] == "equilibrium"
 
 
@@ -57,7 +52,7 @@ def test_a_system_file_gives_its_modes_or_its_equilibrium(folder):
 def test_messages_name_what_was_expected(folder, monkeypatch, arguments, words):
     monkeypatch.chdir(folder)
     before = sorted(folder.iterdir())
-    result = run("view", *arguments)
+    result = run_floatframe("view", *arguments)
     assert result.exit_code == 2
     assert words in " ".join(result.stderr.split())
     assert sorted(folder.iterdir()) == before
@@ -66,10 +61,10 @@ def test_messages_name_what_was_expected(folder, monkeypatch, arguments, words):
 def test_a_modal_file_that_is_gone_or_another_is_named(folder):
     write(synthetic_reduced_body(), folder / "part.h5")
     (folder / "spin.toml").write_text(FLEXIBLE)
-    assert run("run", folder / "spin.toml").exit_code == 0
+    assert run_floatframe("run", folder / "spin.toml").exit_code == 0
     write(synthetic_reduced_body(seed=1), folder / "part.h5")
-    assert "has changed since" in run("view", folder / "spin.h5").stderr
+    assert "has changed since" in run_floatframe("view", folder / "spin.h5").stderr
     (folder / "part.h5").unlink()
-    assert "no such file" in run("view", folder / "spin.h5").stderr
+    assert "no such file" in run_floatframe("view", folder / "spin.h5").stderr
     (folder / "spin.toml").unlink()
-    assert "put the modal file back" in " ".join(run("view", folder / "spin.h5").stderr.split())
+    assert "put the modal file back" in " ".join(run_floatframe("view", folder / "spin.h5").stderr.split())

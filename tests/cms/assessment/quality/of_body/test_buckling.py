@@ -11,6 +11,7 @@ from cms.assessment.quality.of_body.buckling import check_buckling, critical_loa
 from cms.reduction.basis.frames import NodalFrame
 from fe_models.elements.beams.sections import Rectangle
 from tests.bodies import STEEL
+from tests.cms.command import run_cms
 from tests.cms.reduction.geometric_stiffness.examples import bar_of_beams
 
 SECTION = Rectangle(0.02, 0.01)
@@ -88,11 +89,8 @@ def test_a_file_without_the_matrices_says_so(bars):
 
 
 def test_the_command_lists_the_loads(bars, tmp_path):
-    from typer.testing import CliRunner
-
-    from cms.cli.app import app
 
     cms.write(bars[0], tmp_path / "bar.h5")
-    result = CliRunner().invoke(app, ["check", str(tmp_path / "bar.h5")])
+    result = run_cms("check", tmp_path / "bar.h5")
     assert "Loads that buckle the body" in result.output
     assert "force x at right" in result.output

@@ -14,16 +14,15 @@ import pytest
 from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.validation import validate_fmu
 from numpy.testing import assert_allclose, assert_array_equal
-from typer.testing import CliRunner
 
 import floatframe as ff
-from floatframe.cli.app import app
 from floatframe.design.identification.inertial_parameters import parameters_of
 from floatframe.errors import CosimulationError, ModelError
 from floatframe.files.cosimulation.foreign_slave import ForeignSlave, callbacks
 from floatframe.machines import flexible_arm
 from floatframe.model.functions.time_functions import harmonic
 from floatframe.simulation.foreign_units import ForeignUnit
+from tests.floatframe.command import run_floatframe
 from tests.floatframe.design.generation.calls import ROUNDOFF, Case, all_charts, puma
 from tests.floatframe.design.generation.examples import PENDULUM
 
@@ -335,7 +334,7 @@ def test_the_command_writes_one(tmp_path):
         "--fmi",
         "3",
     ]
-    made = CliRunner().invoke(app, [*words, "--parameter", "stick/m"])
+    made = run_floatframe(*words, "--parameter", "stick/m")
     assert made.exit_code == 0, made.output
     for word in ("pin.angle.value", "pin.angle.force", "stick/m", "FMI 3.0 for"):
         assert word in made.output
@@ -345,7 +344,7 @@ def test_the_command_writes_one(tmp_path):
     )  # fmt: skip
     expected = 4.0 * 0.5 * 9.81 / (0.2 + 4.0 * 0.5**2)  # m l g / (J + m l²), level
     assert_allclose(found["pin.angle.rate"][-1], 0.01 * expected, rtol=1e-5)
-    made = CliRunner().invoke(app, [*words, "--what", "mass"])
+    made = run_floatframe(*words, "--what", "mass")
     assert made.exit_code == 2
     assert "--what: belongs to --to c, python, casadi, matlab; --to fmu-c has --fmi, --step" in made.stderr
 
