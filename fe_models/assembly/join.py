@@ -28,7 +28,7 @@ from fe_models.assembly.constraints import (
     translation_weights,
 )
 from fe_models.body.elimination import eliminate_dofs
-from fe_models.body.fe_body import MULTIPLIER, FEBody, MeanNode, Recovery
+from fe_models.body.fe_body import MULTIPLIER, FEBody, MeanNode, NoNodalRotations, Recovery
 from fe_models.body.rigid_motion import MassLoads
 from fe_models.body.weld import WeldedModel, side_by_side
 from fe_models.foundation.arrays import Array, IntArray
@@ -42,7 +42,7 @@ __all__ = ["Joined", "MasslessNodes", "Part", "join"]
 
 
 @dataclass(frozen=True)
-class MasslessNodes:
+class MasslessNodes(NoNodalRotations):
     """Element model of nodes in constraints only (`fe_models.body.fe_body.ElementModel`); all results are zero."""
 
     n_mesh_dof: int
@@ -52,10 +52,6 @@ class MasslessNodes:
     def has_nodal_stress(self) -> bool:
         """Return False, because there is no material at these nodes."""
         return False
-
-    def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
-        """Return NaN, (n, 3, k), because there is no element at these nodes."""
-        return np.full((len(nodes), 3, np.shape(u)[1]), np.nan)
 
     @property
     def has_geometric_stiffness(self) -> bool:

@@ -33,7 +33,16 @@ from fe_models.foundation.units import Units, unit_system
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.numbering import Numbering
 
-__all__ = ["INTERFACE_KINDS", "MULTIPLIER", "ElementModel", "FEBody", "Interface", "Recovery", "StressPointModel"]
+__all__ = [
+    "INTERFACE_KINDS",
+    "MULTIPLIER",
+    "ElementModel",
+    "FEBody",
+    "Interface",
+    "NoNodalRotations",
+    "Recovery",
+    "StressPointModel",
+]
 
 MULTIPLIER = -1  #: component number of a Lagrange multiplier of a distributing (RBE3) interface
 INTERFACE_KINDS = ("rigid", "distributing", "nodes")
@@ -145,6 +154,14 @@ class ElementModel(Protocol):
         Phi
             Displacement columns over the dofs of the uncoupled body, (n_mesh_dof, n).
         """
+
+
+class NoNodalRotations:
+    """Base of element models without rotations at nodes: these are dofs, or the elements are unknown."""
+
+    def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
+        """Return NaN, (n, 3, k)."""
+        return np.full((len(nodes), 3, np.shape(u)[1]), np.nan)
 
 
 class StressPointModel(Protocol):

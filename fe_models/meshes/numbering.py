@@ -17,7 +17,7 @@ from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import ArrayShape, checked_fields, frozen_copies
 from fe_models.foundation.words import nearest, number_list, quoted
 
-__all__ = ["NONE", "NO_NUMBERS", "NamedSet", "Numbering", "node_place", "numbering_side_by_side"]
+__all__ = ["NONE", "NO_NUMBERS", "NamedSet", "Numbering", "node_place", "numbering_side_by_side", "rows_of_numbers"]
 
 NONE = -1  #: number of a node or element without user number, such as the reference node of an interface
 SHOWN = 3  #: number of closest user numbers that a message lists
@@ -360,3 +360,10 @@ def overlap(numberings: Iterable[Numbering], name: str) -> bool:
 def node_place(numbering: Numbering, nodes: Array, row: int) -> str:
     """Describe a node by its name and position, for messages."""
     return f"node {numbering.node_name(row)} at [{number_list(nodes[row])}]"
+
+
+def rows_of_numbers(numbers: IntArray, order: IntArray, wanted: IntArray) -> IntArray:
+    """Return the rows of node numbers, which `order` sorts; -1 for a missing number."""
+    ordered = numbers[order]
+    at = np.minimum(np.searchsorted(ordered, wanted), len(ordered) - 1)
+    return np.where(ordered[at] == wanted, order[at], -1)

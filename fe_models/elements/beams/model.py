@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
+from fe_models.body.fe_body import NoNodalRotations
 from fe_models.body.rigid_motion import MassLoads
 from fe_models.elements.beams.attachments import Spring, spring_matrix
 from fe_models.elements.beams.axes import LineGeometry
@@ -27,7 +28,7 @@ __all__ = ["BeamModel"]
 
 
 @dataclass(frozen=True, eq=False)
-class BeamModel:
+class BeamModel(NoNodalRotations):
     """Element model of a frame (`fe_body.ElementModel`); six dofs per node come first, then three per skin node."""
 
     nodes: Array  #: nodes of the mesh, (n_nodes, 3) [m]
@@ -120,10 +121,6 @@ class BeamModel:
         table = np.einsum("ncs,psf->npcf", _stress_directions(self.geometry.R[lines]), section.stress)
         n, n_points = table.shape[:2]
         return np.asarray((table.reshape(n, 6 * n_points, 6) @ about).reshape(n, n_points, 6, -1))
-
-    def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
-        """Return NaN, (n, 3, k), because rotations of beam nodes are dofs."""
-        return np.full((len(nodes), 3, np.shape(u)[1]), np.nan)
 
     @property
     def has_geometric_stiffness(self) -> bool:

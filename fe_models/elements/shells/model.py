@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
+from fe_models.body.fe_body import NoNodalRotations
 from fe_models.body.rigid_motion import MassLoads
 from fe_models.elements.beams.geometric import slice_forces
 from fe_models.elements.shells.elements import ShellCells
@@ -25,7 +26,7 @@ TOP, MIDDLE, BOTTOM = 0.5, 0.0, -0.5  #: heights in the thickness, z/t
 
 
 @dataclass(frozen=True, eq=False)
-class ShellModel:
+class ShellModel(NoNodalRotations):
     """Element model of a shell (`fe_body.ElementModel`); six dofs per node come first, then three per skin point."""
 
     n_nodes: int
@@ -91,10 +92,6 @@ class ShellModel:
                     corners = values(group, resultants, rows, height).reshape(-1, 6 * k)
                     total += mean[:, of_chunk] @ corners
         return total.reshape(-1, 6, k)
-
-    def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
-        """Return NaN, (n, 3, k), because rotations of shell nodes are dofs."""
-        return np.full((len(nodes), 3, np.shape(u)[1]), np.nan)
 
     @property
     def has_geometric_stiffness(self) -> bool:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from fe_models.body.fe_body import ElementModel, FEBody, Recovery
+from fe_models.body.fe_body import ElementModel, FEBody, NoNodalRotations, Recovery
 from fe_models.body.rigid_motion import MassLoads
 from fe_models.elements.beams.model import BeamModel
 from fe_models.elements.shells.model import ShellModel
@@ -18,7 +18,7 @@ __all__ = ["StiffenedModel", "element_model_of", "with_frame"]
 
 
 @dataclass(frozen=True, eq=False)
-class StiffenedModel:
+class StiffenedModel(NoNodalRotations):
     """Element model of a shell with a frame on it (`fe_models.body.fe_body.ElementModel`).
 
     The mesh dofs are those of the shell (six per node, three per skin point), then those of the frame (likewise). Each
@@ -50,10 +50,6 @@ class StiffenedModel:
         """Return the stress of the shell at its nodes and skin, then of the frame at its nodes and skin."""
         of_shell, of_frame = self._parts("nodal_stress", u)
         return np.concatenate([self.shell.nodal_stress(of_shell, nodes=nodes), self.frame.nodal_stress(of_frame)])
-
-    def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
-        """Return NaN, (n, 3, k), because rotations of shell and beam nodes are dofs."""
-        return np.full((len(nodes), 3, np.shape(u)[1]), np.nan)
 
     @property
     def has_geometric_stiffness(self) -> bool:

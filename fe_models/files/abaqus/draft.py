@@ -1,6 +1,6 @@
 """Content of an Abaqus or CalculiX deck while it is read."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -93,23 +93,11 @@ class Draft:
 
     def nodes_of(self, here: str, word: str) -> IntArray:
         """Return the node numbers of a node number, a node set or an element set."""
-        word = word.strip().strip('"')
-        if word.lstrip("+").isdigit():
-            return np.array([int(word)], dtype=np.int64)
-        key = word.upper()
-        if key not in self.mesh.node_sets:
-            raise MeshError(f"{here}: unknown node set {quoted(word)}{nearest(word, self.mesh.node_sets)}")
-        return self.mesh.node_sets[key]
+        return _numbers_of(here, word, "node", self.mesh.node_sets)
 
     def elements_of(self, here: str, word: str) -> IntArray:
         """Return the element numbers of an element number or an element set."""
-        word = word.strip().strip('"')
-        if word.lstrip("+").isdigit():
-            return np.array([int(word)], dtype=np.int64)
-        key = word.upper()
-        if key not in self.mesh.element_sets:
-            raise MeshError(f"{here}: unknown element set {quoted(word)}{nearest(word, self.mesh.element_sets)}")
-        return self.mesh.element_sets[key]
+        return _numbers_of(here, word, "element", self.mesh.element_sets)
 
     def points_of(self, word: str) -> PointElements | None:
         """Return the point elements of a set, and stop requiring a section for them; None if there are none."""
@@ -250,3 +238,12 @@ class Draft:
         """Return the axes of a node, identical for nodes whose axes agree to rounding; empty: basic axes."""
         axes = self.transformed.get(node)
         return b"" if axes is None else (np.round(axes, AXES_DIGITS) + 0.0).tobytes()
+
+
+def _numbers_of(here: str, word: str, what: str, sets: Mapping[str, IntArray]) -> IntArray:
+    word = word.strip().strip('"')
+    if word.lstrip("+").isdigit():
+        return np.array([int(word)], dtype=np.int64)
+    if word.upper() not in sets:
+        raise MeshError(f"{here}: unknown {what} set {quoted(word)}{nearest(word, sets)}")
+    return sets[word.upper()]

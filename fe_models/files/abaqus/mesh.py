@@ -21,6 +21,7 @@ from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.cells.raw_mesh import RawBlock, RawMesh
 from fe_models.meshes.mesh import SOLID_TYPES
+from fe_models.meshes.numbering import rows_of_numbers
 
 __all__ = ["DeckMesh", "deck_mesh", "naming_note", "raw_mesh_of", "read_abaqus"]
 
@@ -139,7 +140,7 @@ class DeckMesh:
     def rows_of(self, numbers: IntArray) -> IntArray:
         """Return the rows of these node numbers; -1 for a missing node."""
         order = np.argsort(self.node_numbers, kind="stable")
-        return _rows(self.node_numbers, order, numbers)
+        return rows_of_numbers(self.node_numbers, order, numbers)
 
 
 def read_abaqus(path: Path, data: bytes) -> RawMesh:
@@ -253,9 +254,9 @@ def raw_mesh_of(mesh: DeckMesh, notes: list[str]) -> RawMesh:
     for _, kind, table in mesh.elements:
         rows = {name: np.flatnonzero(np.isin(table[:, 0], members)) for name, members in groups.items()}
         rows = {name: found for name, found in rows.items() if found.size}
-        raw_blocks.append(RawBlock(kind, _rows(mesh.node_numbers, order, table[:, 1:]), rows, table[:, 0]))
+        raw_blocks.append(RawBlock(kind, rows_of_numbers(mesh.node_numbers, order, table[:, 1:]), rows, table[:, 0]))
     sets = {
-        mesh.spelling[f"NSET {name}"]: _rows(mesh.node_numbers, order, members)
+        mesh.spelling[f"NSET {name}"]: rows_of_numbers(mesh.node_numbers, order, members)
         for name, members in mesh.node_sets.items()
     }
     notes = [*notes, *mesh.notes]
@@ -398,10 +399,3 @@ def _require_unique(where: str, what: str, numbers: IntArray) -> None:
             f"{where}: {(count > 1).sum()} {what} numbers are defined twice, first "
             f"{values[count > 1][0]}; keep one of each"
         )
-
-
-def _rows(numbers: IntArray, order: IntArray, wanted: IntArray) -> IntArray:
-    """Return the rows of these node numbers; -1 for a missing node."""
-    ordered = numbers[order]
-    at = np.minimum(np.searchsorted(ordered, wanted), len(ordered) - 1)
-    return np.where(ordered[at] == wanted, order[at], -1)

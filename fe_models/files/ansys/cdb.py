@@ -13,6 +13,7 @@ from fe_models.files.decks.deck import Deck, DeckLayer, DeckMaterial, Load, Shel
 from fe_models.files.decks.ledger import Ledger
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.meshes.cells.raw_mesh import RawBlock, RawMesh
+from fe_models.meshes.numbering import rows_of_numbers
 
 __all__ = ["read_cdb_deck"]
 
@@ -268,7 +269,7 @@ def _deck(path: Path, draft: _Draft) -> Deck:
         listed[1].append(nodes)
     blocks = []
     for (shape, group), (own, rows) in cells.items():
-        table = _rows(numbers, order, np.array(rows, dtype=np.int64))
+        table = rows_of_numbers(numbers, order, np.array(rows, dtype=np.int64))
         own_numbers = np.array(own, dtype=np.int64)
         groups = {group: np.arange(len(own))}
         for name, (what, members) in draft.components.items():
@@ -277,7 +278,7 @@ def _deck(path: Path, draft: _Draft) -> Deck:
                 groups[name] = inside
         blocks.append(RawBlock(shape, table, groups, own_numbers))
     sets = {
-        name: _rows(numbers, order, members)
+        name: rows_of_numbers(numbers, order, members)
         for name, (what, members) in draft.components.items()
         if what.startswith("NODE")
     }
@@ -289,7 +290,7 @@ def _deck(path: Path, draft: _Draft) -> Deck:
     if draft.forces:
         given = {}
         for number, force in draft.forces.items():
-            sets[f"node_{number}"] = _rows(numbers, order, np.array([number]))
+            sets[f"node_{number}"] = rows_of_numbers(numbers, order, np.array([number]))
             given[f"node_{number}"] = tuple(force.tolist())
         loads.append(Load("forces", forces=given))
     used_materials = {row[0] for row in draft.elements}
@@ -418,20 +419,13 @@ def _shape(where: str, kind: int, row: list[int]) -> tuple[str, list[int]]:
     return ("hexahedron20", n[:20]) if is_quadratic else ("hexahedron", n[:8])
 
 
-def _rows(numbers: IntArray, order: IntArray, wanted: IntArray) -> IntArray:
-    """Return the rows of these node numbers; -1 for a missing node."""
-    ordered = numbers[order]
-    at = np.minimum(np.searchsorted(ordered, wanted), len(ordered) - 1)
-    return np.where(ordered[at] == wanted, order[at], -1)
-
-
 def _supports(
     draft: _Draft, numbers: IntArray, order: IntArray, used: IntArray, sets: dict[str, IntArray]
 ) -> tuple[list[Support], dict[str, IntArray]]:
     """Return one support for each set of fixed components, and the groups of its nodes."""
     by: dict[tuple[int, ...], list[int]] = {}
     for number, components in draft.held.items():
-        row = int(_rows(numbers, order, np.array([number]))[0])
+        row = int(rows_of_numbers(numbers, order, np.array([number]))[0])
         if row in used and components:
             by.setdefault(tuple(sorted(components)), []).append(row)
     supports = []

@@ -20,7 +20,7 @@ from fe_models.meshes.boundary import boundary_triangles
 from fe_models.meshes.mesh import Mesh
 from fe_models.meshes.mesh_numbering import node_sets, solid_numbering
 from fe_models.meshes.node_cloud import NodeCloud
-from fe_models.meshes.numbering import Numbering
+from fe_models.meshes.numbering import Numbering, rows_of_numbers
 
 __all__ = ["MatrixReport", "body_from_foreign", "nodes_of", "with_geometry", "without_supports"]
 
@@ -244,15 +244,14 @@ def rows_of_nodes(where: str, read: ForeignMatrices) -> IntArray:
             f"{read.dofs[scalars[0], 0]}: these are the matrices of a reduced body, which `cms import` takes"
         )
     order = np.argsort(read.node_numbers)
-    ordered = read.node_numbers[order]
-    at = np.minimum(np.searchsorted(ordered, read.dofs[:, 0]), len(ordered) - 1)
-    missing = np.unique(read.dofs[ordered[at] != read.dofs[:, 0], 0])
+    rows = rows_of_numbers(read.node_numbers, order, read.dofs[:, 0])
+    missing = np.unique(read.dofs[rows < 0, 0])
     if len(missing):
         raise MatrixError(
             f"{where}: {len(missing)} nodes of the rows are not in the geometry, first {missing[0]}; is this the deck "
             "they were made of?"
         )
-    return np.stack([order[at], read.dofs[:, 1]], axis=1)
+    return np.stack([rows, read.dofs[:, 1]], axis=1)
 
 
 def numbers_of(geometry: Mesh | NodeCloud) -> IntArray:

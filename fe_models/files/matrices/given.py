@@ -12,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from fe_models.body.fe_body import FEBody, Interface, put_translations
+from fe_models.body.fe_body import FEBody, Interface, NoNodalRotations, put_translations
 from fe_models.body.freedom import rigid_forces
 from fe_models.body.held_causes import mistake_description, support_description
 from fe_models.body.positive_mass import DENSE, negative_mass, positive_mass
@@ -37,7 +37,7 @@ INTERFACE_KEYS = ("kind", "nodes", "reference", "triad", "weights")
 
 
 @dataclass(frozen=True, eq=False)
-class ScalarMassModel:
+class ScalarMassModel(NoNodalRotations):
     """Exact mass integrals of a body with M = M_s ⊗ 1₃; an `fe_models.body.fe_body.ElementModel`."""
 
     name: str
@@ -63,10 +63,6 @@ class ScalarMassModel:
             f"body {self.name!r}: it came as bare matrices, which know no stress; build it from its mesh "
             f"(fe_models.elements.solids.body.solid_body) for stresses"
         )
-
-    def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
-        """Return NaN, (n, 3, k), because elements of bare matrices are unknown."""
-        return np.full((len(nodes), 3, np.shape(u)[1]), np.nan)
 
     @property
     def has_geometric_stiffness(self) -> bool:

@@ -20,6 +20,7 @@ from fe_models.files.nastran.bulk_data.coordinate_systems import SYSTEM_CARDS, r
 from fe_models.files.nastran.bulk_data.includes import bulk_parts, bulk_text
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.meshes.cells.raw_mesh import RawBlock, RawMesh
+from fe_models.meshes.numbering import rows_of_numbers
 
 __all__ = ["ELEMENT_TYPES", "element_of", "mesh_of_elements", "read_nastran"]
 
@@ -137,7 +138,6 @@ def mesh_of_elements(where: str, points: Mapping[int, Array], elements: Iterable
     """
     numbers = np.array(list(points), dtype=np.int64)
     order = np.argsort(numbers, kind="stable")
-    ordered = numbers[order]
     cells: dict[tuple[str, int, str], tuple[list[int], list[list[str]]]] = {}
     for card, number, group, nodes in elements:
         own_numbers, rows = cells.setdefault((card, len(nodes), group), ([], []))
@@ -150,14 +150,14 @@ def mesh_of_elements(where: str, points: Mapping[int, Array], elements: Iterable
             wanted = np.array(rows, dtype=np.int64)
         except ValueError as error:
             raise MeshError(f"{where}: {card}: expected grid numbers; {error}") from error
-        at = np.minimum(np.searchsorted(ordered, wanted), len(ordered) - 1)
-        missing = np.argwhere(ordered[at] != wanted)
+        table = rows_of_numbers(numbers, order, wanted)
+        missing = np.argwhere(table < 0)
         if len(missing):
             row, column = missing[0]
             raise MeshError(
                 f"{where}: {card} {own_numbers[row]} names grid point {wanted[row, column]}, which is not defined"
             )
-        table = order[at] if local is None else order[at][:, local]
+        table = table if local is None else table[:, local]
         groups = {group: np.arange(len(rows))} if group else {}
         blocks.append(RawBlock(kind, table, groups, np.array(own_numbers, dtype=np.int64)))
     return RawMesh(np.array(list(points.values())), tuple(blocks), node_numbers=numbers)

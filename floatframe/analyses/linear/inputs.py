@@ -33,7 +33,7 @@ from floatframe.model.functions.time_functions import TimeFunction, constant, po
 from floatframe.model.joints.rows import kind_of
 from floatframe.model.state import State
 from floatframe.model.system import System
-from floatframe.results.sensors.channels import QUANTITIES, RATES, Channel, rate_unit
+from floatframe.results.sensors.channels import QUANTITIES, Channel, rate_unit, require_rate
 from floatframe.results.sensors.joint_coordinate import JointCoordinate
 from floatframe.results.small_motions.small_motions import BaseColumn, InputForce, SmallMotions
 from floatframe.results.trajectory import Trajectory
@@ -73,7 +73,7 @@ class DriveMotion:
     rate: int = 2
 
     def __post_init__(self) -> None:
-        require_input_rate(f"input {self.name!r}", self.rate)
+        require_rate(f"input {self.name!r}", self.rate)
 
     def force_units(self, units: Units) -> str:
         """Return the unit of the input."""
@@ -120,7 +120,7 @@ class BaseMotion:
             object.__setattr__(self, "joints", tuple(self.joints))
         if self.quantity not in QUANTITIES:
             raise ModelError(f"{where}: quantity: expected one of {', '.join(QUANTITIES)}, got {self.quantity!r}")
-        require_input_rate(where, self.rate)
+        require_rate(where, self.rate)
 
     def force_units(self, units: Units) -> str:
         """Return the unit of the input."""
@@ -150,12 +150,6 @@ class ParameterInput:
     def force_units(self, units: Units) -> str:
         """Return the unit of the input, which is unknown for a parameter."""
         return "1"
-
-
-def require_input_rate(where: str, rate: int) -> None:
-    """Raise `ModelError` unless a rate is 0, 1 or 2."""
-    if rate not in (0, 1, 2):
-        raise ModelError(f"{where}: rate: expected 0, 1 or 2 ({', '.join(RATES)}), got {rate!r}")
 
 
 def input_rate(channel: Any) -> int:
