@@ -50,8 +50,8 @@ def test_a_system_file_becomes_a_description_with_the_same_dynamics(gripper, tmp
     assert result.exit_code == 2
     assert "URDF requires limits of a prismatic joint; effort, velocity not given" in result.stderr
     assert not (tmp_path / "back").exists()
-    gripper, urdf = tmp_path / "out" / "gripper.toml", tmp_path / "back" / "g.urdf"
-    result = run_floatframe("export", gripper, "-o", urdf, "--effort", 9, "--velocity", 2)
+    system, urdf = tmp_path / "out" / "gripper.toml", tmp_path / "back" / "g.urdf"
+    result = run_floatframe("export", system, "-o", urdf, "--effort", 9, "--velocity", 2)
     assert result.exit_code == 0, result.output
     assert "note: omitted: gravity" in result.stderr
     assert (tmp_path / "back" / "meshes" / "finger_0.stl").is_file()
