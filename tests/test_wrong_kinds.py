@@ -74,6 +74,9 @@ def test_a_marker_can_be_written_as_body_and_interface():
     spring = ff.SpringDamper("spring", "ground", "rod.big_end", stiffness=10.0)
     assert (spring.marker_a.body, spring.marker_a.interface) == ("ground", None)
     assert (spring.marker_b.body, spring.marker_b.interface) == ("rod", "big_end")
+    pin = ff.RevoluteJoint("pin", "rod.big_end", "rod.2")
+    (pin,) = ff.System(block(name="rod.2"), pin).joints
+    assert (pin.marker_a.body, pin.marker_a.interface, pin.marker_b) == ("rod", "big_end", "rod.2")
 
 
 @pytest.mark.parametrize("integrator", [ff.GeneralizedAlpha, "generalized-alpha", ff.GeneralizedAlpha()])

@@ -1,6 +1,6 @@
 """A system: bodies, joints and forces in one coherent set of units."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
 from typing import Annotated, Any, Protocol, TypeVar, cast
@@ -150,6 +150,9 @@ class System:
             "controllers", "data_files",
         ):  # fmt: skip
             object.__setattr__(self, part, tuple(getattr(self, part)))
+        names = {body.name for body in self.bodies}
+        for part in ("joints", "forces"):
+            object.__setattr__(self, part, tuple(with_markers(each, names) for each in getattr(self, part)))
         if self.units.name != "m-kg-s":
             for part in ("joints", "forces", "couplers", "elements"):
                 known = (in_units_of(self.units, each) if is_dataclass(each) else each for each in getattr(self, part))
@@ -215,6 +218,13 @@ class System:
                 return body
         choices = [body.name for body in self.bodies]
         raise ModelError(f"system {self.name!r}: no body {quoted(name)}{nearest(name, choices)}")
+
+
+def with_markers(part: Any, bodies: Container[str]) -> Any:
+    """Return a joint or force in which a text "body.interface" that is not the name of a body has become a marker."""
+    given = {key: getattr(part, key, None) for key in ("marker_a", "marker_b")}
+    texts = {key: text for key, text in given.items() if isinstance(text, str) and "." in text and text not in bodies}
+    return replace(part, **{key: Marker.of_name(text) for key, text in texts.items()}) if texts else part
 
 
 def require_names(where: str, names: Iterable[str], *, taken: Iterable[str] = ()) -> None:

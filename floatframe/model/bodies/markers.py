@@ -90,7 +90,7 @@ class Marker:
             raise ModelError(f"marker on {body_name(self.body)!r}: {error}") from error
 
 
-#: a marker, or a body (or its name), whose marker is then placed at the joint's other marker
+#: a marker, also by name ("body.interface"), or a body (or its name), whose marker is at the joint's other marker
 Place = Marker | Named | str
 
 

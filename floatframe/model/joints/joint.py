@@ -52,11 +52,11 @@ class Joint:
 
         @property
         def marker_a(self) -> Place:
-            """Marker A; a body, or its name, is attached where marker B is."""
+            """Marker A, also as "body.interface"; a body, or its name, is attached where marker B is."""
 
         @property
         def marker_b(self) -> Place:
-            """Marker B; a body, or its name, is attached where marker A is."""
+            """Marker B, also as "body.interface"; a body, or its name, is attached where marker A is."""
 
         @property
         def size(self) -> int:
