@@ -31,7 +31,6 @@ __all__ = ["animate", "bodies_of", "motion_scene", "require_modal_files"]
 VISIBLE = 0.02  #: displacement, relative to the diagonal of a body, below which displacements are magnified
 DRAWN = 0.06  #: largest magnified displacement, relative to the diagonal of a body
 LARGEST = 0.2  #: half edge of the box of a rigid body, divided by the size of the scene
-HIDDEN = 0.1  #: fraction of the nodes of a flexible body within a box from which the box is drawn transparent
 GLASS = 0.35  #: opacity of a transparent box
 MOST_TRIADS = 11  #: number of named axes above which no axes are drawn
 TRAIL_COLOR, RIGID_COLOR = "#7d5ba6", "#9fb0bf"
@@ -271,8 +270,7 @@ def hides_flexible(
     for other, body in flexible.items():
         r_o, R_o = frames[other]
         local = (r_o[0] + body.nodes @ R_o[0].T - r[0]) @ R[0]
-        inside = ((local > low) & (local < high)).all(axis=1)
-        if inside.mean() > HIDDEN:
+        if ((local > low) & (local < high)).all(axis=1).any():
             return True
     return False
 

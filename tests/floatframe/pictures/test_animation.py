@@ -12,7 +12,7 @@ from floatframe.errors import ResultsError
 from floatframe.model.bodies.rigid_body import RigidBody
 from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_matrix
 from floatframe.model.shapes import Road, Wheel
-from floatframe.pictures.animation import animate, bodies_of, motion_scene, trail
+from floatframe.pictures.animation import animate, bodies_of, hides_flexible, motion_scene, trail
 from floatframe.pictures.film_times import film_times, round_below, speed_words, time_words
 from floatframe.pictures.stage import box_of, film_size, ground_grid, view_axes
 from floatframe.results.head import BodyEntry, Head
@@ -202,6 +202,15 @@ def test_a_body_without_picture_is_a_cube_at_its_origin(body):
     assert cube.nodes.shape[1:] == (8, 3)
     times = film_times(trajectory.t, fps=5, speed=1.0)
     assert_allclose(cube.nodes.mean(axis=1), trajectory.body("block").r[times.rows], rtol=0, atol=1e-9)
+    assert cube.opacity == 1.0
+
+
+def test_a_box_that_hides_a_node_of_a_flexible_body_is_found(body):
+    diagonal = np.linalg.norm(np.ptp(body.nodes, axis=0))
+    corners = 1e-6 * diagonal * np.array([[-1.0, -1, -1], [1, 1, 1]])
+    for shift, hides in ((0.0, True), (1e-3 * diagonal, False)):
+        frames = {"rod": (np.zeros((1, 3)), np.eye(3)[None]), "box": (body.nodes[:1] + shift, np.eye(3)[None])}
+        assert hides_flexible("box", corners, frames, {"rod": body}) == hides
 
 
 def test_the_box_of_a_rigid_body_has_its_inertia():
