@@ -287,8 +287,12 @@ def output_path(
 # Tables --------------------------------------------------------------------------------------------------------------
 
 
-def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-    """Print a table on standard output. A heading ending in '>' is right-aligned; `columns` may be empty."""
+def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[Any]], *, is_named: bool = False) -> None:
+    """Print a table on standard output.
+
+    A heading ending in '>' is right-aligned; `columns` may be empty. With `is_named`, the first column holds names,
+    which are not broken.
+    """
     from rich import box
     from rich.table import Table
 
@@ -296,10 +300,11 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[Any]
         title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD if any(columns) else box.SIMPLE,
         show_header=any(columns), pad_edge=False,
     )  # fmt: skip
-    for column in columns:
+    for k, column in enumerate(columns):
         right = column.endswith(">")
         heading = escape(column.removesuffix(">"))
-        table.add_column(heading, justify="right" if right else "left", no_wrap=right, overflow="fold")
+        no_wrap = right or (k == 0 and is_named)
+        table.add_column(heading, justify="right" if right else "left", no_wrap=no_wrap, overflow="fold")
     for row in rows:
         table.add_row(*(escape(cell) for cell in row))
     out().print(table)

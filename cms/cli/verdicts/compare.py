@@ -205,10 +205,11 @@ def print_comparison(comparison: "Comparison") -> None:
         numbers = ["", "", *[""] * len(DECIDING)]
         if point is not None:
             numbers = [str(point.n_modes), str(point.n_q), *(share(point.record(name).value) for name in DECIDING)]
-        rows.append((result.name, MARKS[result.verdict], *numbers, seconds(result.seconds)))
-    headings = ("set", "verdict", "modes>", "coord.>", *(f"{SHORT[name]}>" for name in DECIDING), "time>")
+        rows.append((result.name, MARKS[result.verdict].split()[0], *numbers, seconds(result.seconds)))
+    headings = ("set", "", "modes>", "coord.>", *(f"{SHORT[name]}>" for name in DECIDING), "time>")
     title = f"Mode sets of {comparison.name} up to {hertz(full.band_hz)} Hz ({full.n_band} elastic free modes)"
-    print_table(title, headings, rows)
+    shown = [k for k in range(len(headings)) if k < 2 or any(row[k] not in ("", "\u2013") for row in rows)]
+    print_table(title, [headings[k] for k in shown], [[row[k] for k in shown] for row in rows], is_named=True)
     for result in comparison.sets:
         say(f"{result.name}: {result.sentence}")
     source = "taken from an earlier comparison" if full.was_cached else "solved"

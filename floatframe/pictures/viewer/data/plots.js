@@ -26,7 +26,7 @@ View.plots = function (record, array, seek) {
       legend: { live: true },
       axes: [
         { size: 26, font: "11px sans-serif", stroke: "#66727e", grid: { stroke: "#eef1f4" }, ticks: { stroke: "#dde2e7", size: 4 } },
-        { size: 54, space: 24, font: "11px sans-serif", stroke: "#66727e", grid: { stroke: "#eef1f4" }, ticks: { stroke: "#dde2e7", size: 4 }, values: (u, splits) => splits.map(digits) },
+        { size: 60, space: 24, font: "11px sans-serif", stroke: "#66727e", grid: { stroke: "#eef1f4" }, ticks: { stroke: "#dde2e7", size: 4 }, values: (u, splits) => splits.map(digits) },
       ],
       series: [
         { label: `t [${record.units.time}]`, value: (u, v) => digits(v) },
