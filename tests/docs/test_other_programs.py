@@ -19,6 +19,7 @@ PAGES = {
         ("beam.toml", "held.h5", "cube.h5"),
     ),
     "cad": ((), ("faces.png", "block.h5")),
+    "co_simulation": ((), ("unit.fmu", "small.fmu")),
     "matlab": ((), ("part.h5", "part_reduced.mat", "part_simscape.mat", "absorber.mat")),
     "nastran": (
         ("nastran/outboard.op4", "nastran/outboard.pch", "nastran/outboard.asm", "nastran/outboard.blk"),

@@ -93,7 +93,7 @@ def is_name(dotted):
 
 #: modules of readers' own, in examples: a generated file, a package or script of theirs
 EXAMPLES = re.compile(
-    r"(?:FILE|NAME|MODULE|rubber/\w+|buffers/\w+|mount|arm_forces|deck|part|test|bar(?:_\w+)?|pile)\.py"
+    r"(?:FILE|NAME|MODULE|rubber/\w+|buffers/\w+|mount|arm_forces|deck|part|stepping|test|bar(?:_\w+)?|pile)\.py"
 )
 
 
