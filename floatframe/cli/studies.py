@@ -25,7 +25,7 @@ MOST_ROWS = 60  #: largest number of printed rows
 
 @guarded
 def sweep_command(
-    study: Annotated[Path, typer.Argument(help="Study file (TOML), see docs/analyses.md.")],
+    study: Annotated[Path, typer.Argument(help="Study file (TOML), see docs/sweeps.md.")],
     outputs: Annotated[
         list[Path],
         typer.Option(

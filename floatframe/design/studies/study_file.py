@@ -1,4 +1,4 @@
-"""The study file, which `floatframe sweep` reads (docs/analyses.md, "Parameter sweeps")."""
+"""The study file, which `floatframe sweep` reads (docs/sweeps.md)."""
 
 import itertools
 import os
