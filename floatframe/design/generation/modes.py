@@ -21,6 +21,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.design.generation.graph import Graph, Terms, terms
+from floatframe.engine.initial_conditions.newton_equations import modal_matrix, stored_array
 from floatframe.engine.kernels.model import C1, C3, C4, DAMPING, K_ROTATION, K_TRANSLATION, MASS, S_AB, STIFFNESS
 from floatframe.engine.tree.recursion.expansion import Expansion, marker_shape
 from floatframe.model.bodies.marker_shape import MarkerShape
@@ -84,20 +85,12 @@ def without_noise(x: Array, bound: Array) -> Array:
 def blocks_of(expansion: Expansion, i: int) -> dict[int, Array]:
     """Return the numbers of body i by their names in `kernels.model`; missing geometric stiffness is zero."""
     model = expansion.compiled.model
-    types, t, n = model.body_types, int(model.bodies.kind[i]), int(model.bodies.n_q[i])
-    shapes: dict[int, tuple[int, ...]] = {
-        C1: (3, n), C3: (3, 3, n), S_AB: (n, 3, 3, n), C4: (n, 3, n), MASS: (n, n), STIFFNESS: (n, n),
-        DAMPING: (n, n), K_TRANSLATION: (n, 3, n), K_ROTATION: (n, 3, n),
-    }  # fmt: skip
-    blocks = {}
-    for which, shape in shapes.items():
-        start = int(types.block0[t, which])
-        if which in (K_TRANSLATION, K_ROTATION) and not types.is_stiffened[t]:
-            blocks[which] = np.zeros(shape)
-        elif which in (MASS, STIFFNESS, DAMPING) and types.is_diagonal[t, which - MASS]:
-            blocks[which] = np.diag(types.blocks[start : start + n])
-        else:
-            blocks[which] = types.blocks[start : start + int(np.prod(shape))].reshape(shape)
+    n, is_stiffened = int(model.bodies.n_q[i]), bool(model.body_types.is_stiffened[model.bodies.kind[i]])
+    blocks = {which: modal_matrix(model, i, which) for which in (MASS, STIFFNESS, DAMPING)}
+    for which, shape in ((C1, (3, n)), (C3, (3, 3, n)), (S_AB, (n, 3, 3, n)), (C4, (n, 3, n))):
+        blocks[which] = stored_array(model, i, which, *shape)
+    for which in (K_TRANSLATION, K_ROTATION):
+        blocks[which] = stored_array(model, i, which, n, 3, n) if is_stiffened else np.zeros((n, 3, n))
     return blocks
 
 

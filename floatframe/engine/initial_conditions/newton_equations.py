@@ -1,5 +1,6 @@
 """The linearised equations at one iterate and their solution, for computations outside the time loop."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -215,23 +216,21 @@ def balanced_scales(diagonal: Array, J: Any, G: Any, V: Any) -> tuple[Array, Arr
 
 def modal_diagonals(model: Model, i: int, which: int) -> Array:
     """Return the diagonal of M*, K* or D* of a body, (n_q,)."""
-    n, t = int(model.bodies.n_q[i]), model.bodies.kind[i]
-    if n == 0:
-        return np.zeros(0)
-    start = model.body_types.block0[t, which]
-    step = 1 if model.body_types.is_diagonal[t, which - MASS] else n + 1
-    return model.body_types.blocks[start : start + n * step : step][:n]
+    return np.diagonal(modal_matrix(model, i, which))
 
 
 def modal_matrix(model: Model, i: int, which: int) -> Array:
     """Return the modal matrix M*, K* or D* of a body, (n_q, n_q)."""
-    n, t = int(model.bodies.n_q[i]), model.bodies.kind[i]
-    if n == 0:
-        return np.zeros((0, 0))
-    start = model.body_types.block0[t, which]
-    if model.body_types.is_diagonal[t, which - MASS]:
-        return np.diag(model.body_types.blocks[start : start + n])
-    return model.body_types.blocks[start : start + n * n].reshape(n, n)
+    n = int(model.bodies.n_q[i])
+    if model.body_types.is_diagonal[model.bodies.kind[i], which - MASS]:
+        return np.diag(stored_array(model, i, which, n))
+    return stored_array(model, i, which, n, n)
+
+
+def stored_array(model: Model, i: int, which: int, *shape: int) -> Array:
+    """Return one of the constant arrays of a body, which has this shape."""
+    start = int(model.body_types.block0[model.bodies.kind[i], which])
+    return model.body_types.blocks[start : start + math.prod(shape)].reshape(shape)
 
 
 def highest_frequency(model: Model) -> float:

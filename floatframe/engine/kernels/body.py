@@ -17,7 +17,7 @@ D and J include them. Most of the cost is one pass over S_ab (9 n² numbers), on
 K_r (6 n²).
 """
 
-from floatframe.engine.kernels.compiler.compilation import loops, view
+from floatframe.engine.kernels.compiler.compilation import loops, small, view
 from floatframe.engine.kernels.dense import add_products
 from floatframe.engine.kernels.model import C1, C2, C3, C4, DAMPING, K_ROTATION, K_TRANSLATION, MASS, S_AB, STIFFNESS
 from floatframe.engine.kernels.vector import (
@@ -49,14 +49,17 @@ __all__ = [
     "body_forces",
     "body_mass_product",
     "body_tangent",
+    "constant_products",
     "coupling",
     "gyroscopic",
     "inertia_rate",
     "modal_block",
     "modal_matrix",
+    "modal_number",
     "modal_term",
     "moved_inertia",
     "newton_block",
+    "shape_moments",
 ]
 
 
@@ -145,54 +148,60 @@ def moved_inertia(m, s, J, p):
     return add(s, scaled(m, p)), matrix_sum(rows, ((d, 0.0, 0.0), (0.0, d, 0.0), (0.0, 0.0, d)))
 
 
+@small
+def modal_number(types, t, n, which, k):
+    """Return entry k of the diagonal of a modal matrix M, K or D."""
+    return types.blocks[types.block0[t, which] + k * (1 if types.is_diagonal[t, which - MASS] else n + 1)]
+
+
 @loops
-def modal_term(types, t, n, which, x, out):
-    """Add the product of a modal matrix M, K or D with x to `out`, (n_q,)."""
+def modal_term(types, t, n, which, factor, x, out):
+    """Add `factor` times the product of a modal matrix M, K or D with x to `out`, (n_q,)."""
     if types.is_diagonal[t, which - MASS]:
         diagonal = block(types, t, which, n)
         for k in range(n):
-            out[k] += diagonal[k] * x[k]
+            out[k] += factor * (diagonal[k] * x[k])
     else:
         A = modal_matrix(types, t, which, n)
         for k in range(n):
             total = 0.0
             for j in range(n):
                 total += A[k, j] * x[j]
-            out[k] += total
+            out[k] += factor * total
+
+
+@loops
+def constant_products(types, t, which, x, out):
+    """Write Σ_l A_l x_l for one constant array of a type of bodies, whose rows A_l are as long as `out`."""
+    out[:] = 0.0
+    add_products(block(types, t, which, x.shape[0] * out.shape[0]), x, out)
+
+
+@loops
+def shape_moments(types, t, n, q, first):
+    """Write 1C(q) = ds/dq of a type of bodies into `first`, (3 n,); return its first moment s(q)."""
+    own = block(types, t, C1, 3 * n)
+    for j in range(3 * n):
+        first[j] = own[j]
+    if types.is_stiffened[t]:
+        add_products(block(types, t, K_TRANSLATION, 3 * n * n), q, first)
+    return add(vector(types.S[t]), scaled(0.5, add(column_sum(own, n, q), column_sum(first, n, q))))
 
 
 @loops
 def first_moments(model, work, i):
     """Write s(q), 1C(q) = ds/dq, and for a stiffened body K_t q_dot and K_r q_dot, into work.bodies."""
     types, bodies = model.body_types, work.bodies
-    t, n, q0, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
-    put(bodies.s[i], 0, types.S[t])
+    t, n, q0, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i] + 6
     if n == 0:
+        put(bodies.s[i], 0, vector(types.S[t]))
         return
-    own = block(types, t, C1, 3 * n)
-    first = bodies.C1[3 * q0 : 3 * (q0 + n)]
-    for j in range(3 * n):
-        first[j] = own[j]
-    q = work.state.q[q0 : q0 + n]
+    first, end = 3 * q0, 3 * (q0 + n)
+    put(bodies.s[i], 0, shape_moments(types, t, n, work.state.q[q0 : q0 + n], bodies.C1[first:end]))
     if types.is_stiffened[t]:
-        q_dot = work.state.u[u0 + 6 : u0 + 6 + n]
-        K_t, K_r = block(types, t, K_TRANSLATION, 3 * n * n), block(types, t, K_ROTATION, 3 * n * n)
-        K_t_q_dot, K_r_q_dot = bodies.K_t_q_dot[3 * q0 : 3 * (q0 + n)], bodies.K_r_q_dot[3 * q0 : 3 * (q0 + n)]
-        K_t_q_dot[:] = 0.0
-        K_r_q_dot[:] = 0.0
-        add_products(K_t, q, first)
-        add_products(K_t, q_dot, K_t_q_dot)
-        add_products(K_r, q_dot, K_r_q_dot)
-    put_sum(bodies.s[i], 0, scaled(0.5, add(column_sum(own, n, q), column_sum(first, n, q))))
-
-
-@loops
-def products(types, t, n, q, q_dot, W, Y):
-    """Write the products W_ab = S_ab q and Y = 4C q_dot of a type of bodies."""
-    W[:] = 0.0
-    Y[:] = 0.0
-    add_products(block(types, t, S_AB, 9 * n * n), q, W)
-    add_products(block(types, t, C4, 3 * n * n), q_dot, Y)
+        q_dot = work.state.u[u0 : u0 + n]
+        constant_products(types, t, K_TRANSLATION, q_dot, bodies.K_t_q_dot[first:end])
+        constant_products(types, t, K_ROTATION, q_dot, bodies.K_r_q_dot[first:end])
 
 
 @loops
@@ -225,7 +234,8 @@ def modal_forces(model, work, i, a):
     q, q_dot, q_ddot = work.state.q[q0 : q0 + n], work.state.u[u0 : u0 + n], work.state.u_dot[u0 : u0 + n]
     omega, alpha = vector(work.state.u[u0 - 3 :]), vector(work.state.u_dot[u0 - 3 :])
     W, Y, first = bodies.W[9 * q0 : 9 * (q0 + n)], bodies.Y[3 * q0 : 3 * (q0 + n)], bodies.C1[3 * q0 : 3 * (q0 + n)]
-    products(types, t, n, q, q_dot, W, Y)
+    constant_products(types, t, S_AB, q, W)
+    constant_products(types, t, C4, q_dot, Y)
     second, third, h = block(types, t, C2, 3 * n), block(types, t, C3, 9 * n), bodies.residual[u0 : u0 + n]
     zero = (0.0, 0.0, 0.0)
     tau, G, D_q_dot = zero, (zero, zero, zero), (zero, zero, zero)
@@ -242,9 +252,9 @@ def modal_forces(model, work, i, a):
         )
     put_matrix(bodies.J[i], matrix_sum(matrix(types.J0[t]), matrix_sum(G, transposed(G))))
     put_matrix(bodies.D_q_dot[i], D_q_dot)
-    modal_term(types, t, n, MASS, q_ddot, h)
-    modal_term(types, t, n, DAMPING, q_dot, h)
-    modal_term(types, t, n, STIFFNESS, q, h)
+    modal_term(types, t, n, MASS, 1.0, q_ddot, h)
+    modal_term(types, t, n, DAMPING, 1.0, q_dot, h)
+    modal_term(types, t, n, STIFFNESS, 1.0, q, h)
     f = add(column_sum(first, n, q_ddot), cross(scaled(2.0, omega), column_sum(first, n, q_dot)))
     tau = add(tau, scaled(2.0, turned(D_q_dot, omega)))
     if types.is_stiffened[t]:
@@ -271,7 +281,7 @@ def body_mass_product(model, work, i, v, out):
             B_k = coupling(second, W, n, k)
             put_sum(out, 3, scaled(q_dot[k], B_k))
             out[6 + k] = dot(column(first, n, k), v_O) + dot(B_k, omega)
-        modal_term(types, t, n, MASS, q_dot, out[6:])
+        modal_term(types, t, n, MASS, 1.0, q_dot, out[6:])
 
 
 @loops

@@ -30,7 +30,7 @@ from floatframe.engine.kernels.time_function import time_function
 from floatframe.engine.kernels.vector import add, cross, dot, put, put_sum, scaled, sub, turned, turned_back, vector
 from floatframe.model.joints.rows.kinds import NOTHING, VELOCITY
 
-__all__ = ["diagnose", "power"]
+__all__ = ["diagnose", "power", "quadratic"]
 
 
 @inner
@@ -38,9 +38,8 @@ def quadratic(model, work, i, which, x):
     """Return the quadratic form xᵀ M x, xᵀ K x or xᵀ D x of body i."""
     n = model.bodies.n_q[i]
     product = work.bodies.modal[:n]
-    for k in range(n):
-        product[k] = 0.0
-    modal_term(model.body_types, model.bodies.kind[i], n, which, x, product)
+    product[:] = 0.0
+    modal_term(model.body_types, model.bodies.kind[i], n, which, 1.0, x, product)
     total = 0.0
     for k in range(n):
         total += x[k] * product[k]

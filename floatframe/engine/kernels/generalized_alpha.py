@@ -5,7 +5,7 @@ Described in `floatframe.integrators.generalized_alpha`.
 
 import math
 
-from floatframe.engine.kernels.body import block, body_mass_product, modal_matrix
+from floatframe.engine.kernels.body import body_mass_product, modal_number, modal_term
 from floatframe.engine.kernels.compiler.compilation import inner, small
 from floatframe.engine.kernels.connections.gap import next_step, step_before_contact, take_ends
 from floatframe.engine.kernels.connections.user_force import resize_states
@@ -40,6 +40,7 @@ from floatframe.engine.kernels.time_function import time_function
 from floatframe.engine.kernels.turns import count_turns
 from floatframe.engine.kernels.vector import (
     add,
+    copy,
     cross,
     dot,
     norm,
@@ -78,7 +79,6 @@ __all__ = [
     "next_acceleration",
     "ratio_of_steps",
     "shares",
-    "take_stiffness",
     "takes_spin",
     "time_loop",
     "write_row",
@@ -113,26 +113,15 @@ SAME = 1e-12  # relative difference below which step sizes count as equal
 @inner
 def put_weights(model, work, c_k):
     """Write the weights of the norm of corrections: mass, inertia, and M + c_k K of the modes."""
+    types = model.body_types
     for i in range(model.bodies.kind.shape[0]):
         t, u0, n = model.bodies.kind[i], model.bodies.u0[i], model.bodies.n_q[i]
         for k in range(3):
-            work.solver.weight[u0 + k] = model.body_types.mass[t]
-            work.solver.weight[u0 + 3 + k] = model.body_types.J0[t, k, k]
-        for which in (MASS, STIFFNESS):
-            start = model.body_types.block0[t, which]
-            step = 1 if model.body_types.is_diagonal[t, which - MASS] else n + 1
-            factor = 1.0 if which == MASS else c_k
-            for k in range(n):
-                if which == MASS:
-                    work.solver.weight[u0 + 6 + k] = 0.0
-                work.solver.weight[u0 + 6 + k] += factor * model.body_types.blocks[start + k * step]
-
-
-@inner
-def copy(source, target):
-    """Copy numbers."""
-    for k in range(source.shape[0]):
-        target[k] = source[k]
+            work.solver.weight[u0 + k] = types.mass[t]
+            work.solver.weight[u0 + 3 + k] = types.J0[t, k, k]
+        for k in range(n):
+            M, K = modal_number(types, t, n, MASS, k), modal_number(types, t, n, STIFFNESS, k)
+            work.solver.weight[u0 + 6 + k] = M + c_k * K
 
 
 @inner
@@ -340,7 +329,7 @@ def hold_velocities(model, work, c_k):
             work.solver.y_rate[u0 + k] = y[u0 + k]
             total += work.solver.weight[u0 + k] * y[u0 + k] * y[u0 + k]
             residual[k] -= dot(vector(by_turn[u0 + k]), turning)
-        take_stiffness(model, i, y[u0 + 6 : u0 + 6 + n], residual[6:])
+        modal_term(model.body_types, model.bodies.kind[i], n, STIFFNESS, -1.0, y[u0 + 6 : u0 + 6 + n], residual[6:])
     add_reactions(model, work, c_k)
     return total
 
@@ -395,21 +384,6 @@ def are_aged(solver, second, first, of_rates):
     if solver.contraction < 0.0:
         solver.contraction = second / first
     return (second / first - 2.0 * solver.contraction) * of_rates > AGED * first
-
-
-@inner
-def take_stiffness(model, i, q, residual):
-    """Subtract the elastic forces K q of body i from the modal residual."""
-    n, t = model.bodies.n_q[i], model.bodies.kind[i]
-    if model.body_types.is_diagonal[t, STIFFNESS - MASS]:
-        diagonal = block(model.body_types, t, STIFFNESS, n)
-        for k in range(n):
-            residual[k] -= diagonal[k] * q[k]
-        return
-    K = modal_matrix(model.body_types, t, STIFFNESS, n)
-    for k in range(n):
-        for j in range(n):
-            residual[k] -= K[k, j] * q[j]
 
 
 @inner

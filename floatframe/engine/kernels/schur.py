@@ -9,7 +9,7 @@ and Z do not rotate with the body, so that they can be used for many steps; P, R
 
 import math
 
-from floatframe.engine.kernels.body import newton_block
+from floatframe.engine.kernels.body import modal_number, newton_block
 from floatframe.engine.kernels.compiler.compilation import inner, small
 from floatframe.engine.kernels.connections.connection import (
     connection_derivatives,
@@ -18,18 +18,17 @@ from floatframe.engine.kernels.connections.connection import (
 )
 from floatframe.engine.kernels.dense import lu_factor, lu_solve, lu_solve_columns, six_columns
 from floatframe.engine.kernels.evaluation import linearize
-from floatframe.engine.kernels.model import MASS, STIFFNESS
-from floatframe.engine.kernels.vector import add, dot, put, put_sum, scaled, sub, turned, turned_back, vector
+from floatframe.engine.kernels.model import STIFFNESS
+from floatframe.engine.kernels.vector import add, copy, dot, put, put_sum, scaled, sub, turned, turned_back, vector
 from floatframe.model.joints.rows.kinds import NOTHING
 
 __all__ = [
-    "assemble",
+    "add_motion",
     "close_connections",
     "close_velocities",
     "correction",
     "factorize_bodies",
-    "factorize_connections",
-    "factorize_tangents",
+    "factorize_system",
     "move_bodies",
     "renew_connections",
     "settle_accelerations",
@@ -81,11 +80,33 @@ def factorize_tangents(model, work):
 
 
 @inner
+def factorize_system(model, work):
+    """Factorise H of every body and the matrix of the connections; return whether they are regular."""
+    if factorize_tangents(model, work) >= 0:
+        return False
+    assemble(model, work, 0.0)
+    return factorize_connections(model.elimination, model.connections, work.solver) < 0
+
+
+@inner
+def add_motion(model, work, out):
+    """Add the motion y of the bodies to out, (n_u,), with translations in ground axes; return whether it is finite."""
+    y, total = work.solver.y, 0.0
+    for i in range(model.bodies.kind.shape[0]):
+        u0 = model.bodies.u0[i]
+        put_sum(out, u0, turned(work.state.R[i], y[u0:]))
+        for k in range(u0 + 3, model.bodies.u0[i + 1]):
+            out[k] += y[k]
+    for k in range(y.shape[0]):
+        total += y[k]
+    return math.isfinite(total)
+
+
+@inner
 def assemble(model, work, c_k):
     """Assemble the block matrix of the connections at the iterate."""
     s = work.solver.blocks
-    for k in range(s.shape[0]):
-        s[k] = 0.0
+    s[:] = 0.0
     for c in range(model.connections.size.shape[0]):
         connection_derivatives(model, work, c, c_k)
         size, o = model.connections.size[c], model.elimination.diagonal[c]
@@ -330,8 +351,7 @@ def close_velocities(model, work):
     but mu balances only the part of the unknown.
     """
     y = work.solver.y
-    for k in range(y.shape[0]):
-        y[k] = 0.0
+    y[:] = 0.0
     solve_connections(model.elimination, model.connections, work.solver)
     add_wrenches(model, work)
     for i in range(model.bodies.kind.shape[0]):
@@ -374,10 +394,9 @@ def assemble_masses(model, work, c_k):
     for i in range(bodies.kind.shape[0]):
         n, t = 6 + bodies.n_q[i], bodies.kind[i]
         H = newton_block(model, work, i)
-        step = 1 if types.is_diagonal[t, STIFFNESS - MASS] else n - 5
         for k in range(n - 6):
             if not H[6 + k, 6 + k] > 0.0:
-                H[6 + k, 6 + k] += c_k * types.blocks[types.block0[t, STIFFNESS] + k * step]
+                H[6 + k, 6 + k] += c_k * modal_number(types, t, n - 6, STIFFNESS, k)
     if factorize_tangents(model, work) >= 0:
         return False
     assemble(model, work, 0.0)
@@ -403,24 +422,17 @@ def settle_accelerations(model, work, c_k):
         for k in range(u0, u0 + 6 + model.bodies.n_q[i]):
             solver.y[k] = work.state.u_dot[k]
         put(solver.y, u0, turned_back(work.state.R[i], work.state.u_dot[u0:]))
-    for k in range(g.shape[0]):
-        solver.mu[k] = 0.0
+    solver.mu[:] = 0.0
     take_motions(model, work)
     total = 0.0
     for k in range(g.shape[0]):
         if model.rows.holds[k] != NOTHING:
             g[k] = work.connections.bias[k] - solver.mu[k]
     correction(model, work, 1.0, False)
-    for i in range(model.bodies.kind.shape[0]):
-        u0 = model.bodies.u0[i]
-        put_sum(work.state.u_dot, u0, turned(work.state.R[i], solver.y[u0:]))
-        for k in range(u0 + 3, u0 + 6 + model.bodies.n_q[i]):
-            work.state.u_dot[k] += solver.y[k]
-            total += solver.y[k]
     for k in range(g.shape[0]):
         work.state.w[k] += solver.mu[k]
         total += solver.mu[k]
-    return math.isfinite(total)
+    return add_motion(model, work, work.state.u_dot) and math.isfinite(total)
 
 
 @inner
@@ -449,13 +461,10 @@ def share_reactions(model, work, c_k):
                     work.connections.V[c, r, k] *= SOFTER
     if factorize_connections(model.elimination, connections, solver) >= 0:
         return False
-    for k in range(solver.y.shape[0]):
-        solver.y[k] = 0.0
-    for k in range(solver.mu.shape[0]):
-        solver.mu[k] = work.state.w[k]
+    solver.y[:] = 0.0
+    copy(work.state.w, solver.mu)
     add_wrenches(model, work)  # y = M⁻¹ Jᵀ w
-    for k in range(solver.mu.shape[0]):
-        solver.mu[k] = 0.0
+    solver.mu[:] = 0.0
     for sweep in range(SWEEPS):
         if sweep > 0:
             for k in range(solver.mu.shape[0]):
@@ -477,6 +486,5 @@ def share_reactions(model, work, c_k):
         total += solver.mu[k]
     if not math.isfinite(total):
         return False
-    for k in range(solver.mu.shape[0]):
-        work.state.w[k] = solver.mu[k]
+    copy(solver.mu, work.state.w)
     return True

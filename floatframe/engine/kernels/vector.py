@@ -5,13 +5,14 @@ A matrix that is only read may also be an array (3, 3).
 
 import math
 
-from floatframe.engine.kernels.compiler.compilation import small
+from floatframe.engine.kernels.compiler.compilation import inner, small
 
 __all__ = [
     "add",
     "add_block",
     "add_column",
     "congruent",
+    "copy",
     "cross",
     "dot",
     "matrix",
@@ -41,6 +42,13 @@ __all__ = [
 def vector(x):
     """Return the first three numbers of an array as a vector."""
     return x[0], x[1], x[2]
+
+
+@inner
+def copy(source, target):
+    """Copy numbers."""
+    for k in range(source.shape[0]):
+        target[k] = source[k]
 
 
 @small

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.engine.initial_conditions.newton_equations import modal_matrix
-from floatframe.engine.kernels.model import C1, C2, C3, DAMPING, K_TRANSLATION, MASS, S_AB, STIFFNESS, Model
+from floatframe.engine.initial_conditions.newton_equations import modal_matrix, stored_array
+from floatframe.engine.kernels.model import C1, C2, MASS, S_AB, STIFFNESS, Model
 from floatframe.errors import ModelError
 from floatframe.model.rotations import tilde
 
@@ -20,15 +20,11 @@ class CentralBody:
     m: float
     S: Array  #: first moment divided by mass: undeformed centre of mass in the frame, (3,)
     C1: Array  #: derivative of S by q at zero deformation, (3, n)
-    K_t: Array | None  #: second derivative of S by q [l, a, k], (n, 3 n); None if zero
     J0: Array  #: inertia about the frame origin, (3, 3)
     C2: Array  #: coupling of rotation and modes, (3, n)
-    J_k: Array  #: derivative of the inertia by q_k, 3C_k + 3C_kᵀ, (n, 3, 3)
-    S_ab: Array  #: second-order inertia [l, a, b, k], (n, 9 n)
     S_ab_T: Array  #: second-order inertia [k, a, b, l], (n, 9 n)
     M: Array  #: modal mass matrix, (n, n)
     K: Array  #: modal stiffness matrix, (n, n)
-    D: Array  #: modal damping matrix, (n, n)
 
     @property
     def n(self) -> int:
@@ -62,28 +58,14 @@ def central_bodies(model: Model, names: tuple[str, ...], scheme: str) -> tuple[C
 def central_body(model: Model, i: int) -> CentralBody:
     """Return the constants of one body."""
     t, n = int(model.bodies.kind[i]), int(model.bodies.n_q[i])
-    m, S = float(model.body_types.mass[t]), model.body_types.S[t]
-
-    def stored(which: int, *shape: int) -> Array:
-        if n == 0:
-            return np.zeros(shape)
-        first = int(model.body_types.block0[t, which])
-        return model.body_types.blocks[first : first + int(np.prod(shape))].reshape(shape)
-
-    C3_k = np.moveaxis(stored(C3, 3, 3, n), 2, 0)
-    products = stored(S_AB, n, 3, 3, n)
-    is_stiffened = bool(model.body_types.is_stiffened[t]) and n > 0
+    m = float(model.body_types.mass[t])
     return CentralBody(
         m=m,
-        S=S / m,
-        C1=stored(C1, 3, n) / m,
-        K_t=stored(K_TRANSLATION, n, 3 * n) / m if is_stiffened else None,
+        S=model.body_types.S[t] / m,
+        C1=stored_array(model, i, C1, 3, n) / m,
         J0=model.body_types.J0[t],
-        C2=stored(C2, 3, n),
-        J_k=C3_k + np.swapaxes(C3_k, 1, 2),
-        S_ab=products.reshape(n, 9 * n),
-        S_ab_T=np.moveaxis(products, [0, 3], [3, 0]).reshape(n, 9 * n).copy(),
+        C2=stored_array(model, i, C2, 3, n),
+        S_ab_T=np.moveaxis(stored_array(model, i, S_AB, n, 3, 3, n), [0, 3], [3, 0]).reshape(n, 9 * n),
         M=modal_matrix(model, i, MASS),
         K=modal_matrix(model, i, STIFFNESS),
-        D=modal_matrix(model, i, DAMPING),
     )

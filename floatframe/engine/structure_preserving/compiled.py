@@ -54,14 +54,9 @@ def constants_of(ds: DiscreteSystem, h: float, rho_inf: float) -> tuple[Array, I
         if t in done:
             continue
         done.add(t)
-        bent = np.zeros((n, 3 * n)) if body.K_t is None else body.K_t
         none = Filter(np.zeros((n, n)), np.zeros((n, n)), np.zeros((3, n)))
         of_modes = filter_of(body, h, rho_inf) if rho_inf < 1.0 and n else none
-        own = (
-            body.C1, bent, body.C2, body.J_k, body.S_ab, body.S_ab_T, body.M, body.K, body.D, of_modes.F, of_modes.X,
-            of_modes.E,
-        )  # fmt: skip
-        for which, array in enumerate(own):
+        for which, array in enumerate((body.S_ab_T, of_modes.F, of_modes.X, of_modes.E)):
             block0[t, which] = place
             parts.append(np.ascontiguousarray(array).ravel())
             place += array.size
@@ -131,8 +126,7 @@ def discrete_of(ds: DiscreteSystem, scheme: int, h: float, rho_inf: float) -> tu
     model = ds.model
     pattern, sizes = pattern_of(ds)
     blocks, block0 = constants_of(ds, h, rho_inf)
-    kinds, n_u = model.bodies.kind, int(model.bodies.u0[-1])
-    center, is_bent = np.zeros((len(model.body_types.mass), 3)), np.zeros(len(model.body_types.mass), dtype=np.int64)
+    n_u = int(model.bodies.u0[-1])
     weight, scale, mass = np.zeros(n_u), np.zeros(n_u), sum(body.m for body in ds.bodies)
     delta = np.zeros(n_u)
     for i, body in enumerate(ds.bodies):
@@ -141,7 +135,6 @@ def discrete_of(ds: DiscreteSystem, scheme: int, h: float, rho_inf: float) -> tu
         weight[own] = np.concatenate([np.full(3, body.m), np.diag(body.J0), modal])
         delta[own] = SMALL * ds.length * np.sqrt(body.m / weight[own])
         scale[own] = ds.length * np.sqrt(mass / weight[own])
-        center[kinds[i]], is_bent[kinds[i]] = body.S, body.K_t is not None
     held = ds.held
     is_length = is_held_length(model.rows.kind[held]) | is_held_velocity(model.rows.kind[held])
     of_multipliers = mass * ds.length * np.where(is_length, 1.0, ds.length)
@@ -156,7 +149,7 @@ def discrete_of(ds: DiscreteSystem, scheme: int, h: float, rho_inf: float) -> tu
     row_scale = np.concatenate([scale / (mass * ds.length**2), of_held_rows])
     scale = np.concatenate([scale, of_multipliers, of_states])
     made = filled(
-        Discrete(), scheme=scheme, center=center, is_bent=is_bent, is_filtered=int(rho_inf < 1.0),
+        Discrete(), scheme=scheme, is_filtered=int(rho_inf < 1.0),
         is_loaded=int(does_work(model)), blocks=blocks, block0=block0, turns=turns,
         psi0=np.cumsum([0, *sizes_of_markers])[:-1], first=[*(c.first for c in ds.connections), ds.n_held], row=held,
         is_driven=[ds.is_driven(c, k) for c in ds.connections for k in c.held], weight=weight, scale=scale,

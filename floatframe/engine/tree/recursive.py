@@ -15,7 +15,7 @@ from floatframe.engine.compiling.file_frames import state_of_engine, state_of_fi
 from floatframe.engine.compiling.markers import find_marker
 from floatframe.engine.kernels.work import Work, new_work
 from floatframe.engine.tree.recursion.entry import FORWARD, INVERSE, MASS, PLACE, SOLVE, TANGENTS, Prepared
-from floatframe.engine.tree.recursion.expansion import Expansion, expansion_of, positions_of_state
+from floatframe.engine.tree.recursion.expansion import Expansion, expansion_of, positions_and_rates_of_state
 from floatframe.engine.tree.recursion.nodes import ROTATION, Dense, NodeWork, new_dense, new_node_work
 from floatframe.engine.tree.topology import tree_of
 from floatframe.errors import ModelError
@@ -274,14 +274,12 @@ class RelativeModel:
     def positions(self, state: State | None = None) -> tuple[Array, Array]:
         """Return z, (n_z,), and z_dot, (n_rates,), for a state of the bodies; None: the assembled state.
 
-        Joints are assumed to be closed, angles are between -pi and pi, and rates fit the velocities by least squares.
+        Joints are assumed to be closed, angles are between -pi and pi, and rates fit the velocities at each joint by
+        least squares.
         """
         e = self.expansion
         engine = e.compiled.placed if state is None else state_of_engine(e.compiled, state)
-        z = positions_of_state(e, engine)
-        columns = [self.engine_state(z, rate).u for rate in np.eye(self.n_rates)]
-        T = np.array(columns).reshape(self.n_rates, len(engine.u)).T
-        return z, np.asarray(np.linalg.lstsq(T, engine.u, rcond=None)[0], dtype=float)
+        return positions_and_rates_of_state(e, engine)
 
     def moved(self, z: Array, dz: Array) -> Array:
         """Return z after a displacement dz along the rates, (n_rates,); rotations use the exponential map."""

@@ -17,10 +17,11 @@ extent that the contact is stiffer than the mode.
 
 import math
 
-from floatframe.engine.kernels.body import moved_inertia
+from floatframe.engine.kernels.body import modal_number, moved_inertia
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.contact import contact_gap
 from floatframe.engine.kernels.connections.element_law import law_values, n_results
+from floatframe.engine.kernels.joints.relative_motion import distance, relative_velocity
 from floatframe.engine.kernels.marker import marker_acceleration, marker_motion, shape
 from floatframe.engine.kernels.model import ELEMENT, MASS, STIFFNESS
 from floatframe.engine.kernels.rotation import exp_matrix
@@ -113,7 +114,7 @@ def is_far(model, work, c, gap, h):
     if model.connections.law[c] == ELEMENT:
         return False
     a, b, markers = model.connections.a[c], model.connections.b[c], work.markers
-    d, v = sub(vector(markers.r[b]), vector(markers.r[a])), sub(vector(markers.v[b]), vector(markers.v[a]))
+    d, v = distance(markers, a, b), relative_velocity(markers, a, b)
     speed = norm(v) + norm(vector(markers.omega[a])) * norm(d)
     change = norm(sub(vector(markers.bias[b]), vector(markers.bias[a]))) + norm(vector(markers.bias[a, 3:])) * norm(d)
     return gap > 1.5 * h * (speed + 0.5 * h * change)
@@ -125,7 +126,7 @@ def nearest_time(model, work, c):
     if model.connections.law[c] == ELEMENT or not model.contacts.is_sphere[model.connections.item[c]]:
         return -1.0
     a, b, markers = model.connections.a[c], model.connections.b[c], work.markers
-    d, v = sub(vector(markers.r[b]), vector(markers.r[a])), sub(vector(markers.v[b]), vector(markers.v[a]))
+    d, v = distance(markers, a, b), relative_velocity(markers, a, b)
     square = dot(v, v)
     return -dot(d, v) / square if square > 0.0 else -1.0
 
@@ -223,7 +224,7 @@ def put_unit_wrench(model, work, g, t):
     place_markers(model, work, c)
     if model.connections.law[c] != ELEMENT:
         b, i = model.connections.b[c], model.connections.item[c]
-        d = sub(vector(markers.r[b]), vector(markers.r[a]))
+        d = distance(markers, a, b)
         N, M = scaled(1.0 / norm(d), d), (0.0, 0.0, 0.0)
         if not model.contacts.is_sphere[i]:
             N = turned(markers.A[a], vector(model.rows.x[model.connections.w0[c]]))
@@ -318,17 +319,11 @@ def modal_mobility(model, work, g, stiffness):
                     psi, s = work.markers.psi[o : o + 6 * n], turned_back(work.markers.T_left[j], moment)
                     d, th = shape(psi, n, k)
                     Q += dot(d, f) + dot(th, s)
-            M, K = modal_number(model, t, n, MASS, k), modal_number(model, t, n, STIFFNESS, k)
+            types = model.body_types
+            M, K = modal_number(types, t, n, MASS, k), modal_number(types, t, n, STIFFNESS, k)
             if Q != 0.0 and M > 0.0:
                 total += Q * Q / M * stiffness * Q * Q / (stiffness * Q * Q + K)
     return total
-
-
-@inner
-def modal_number(model, t, n, which, k):
-    """Return diagonal entry k of a type's modal mass or stiffness matrix."""
-    step = 1 if model.body_types.is_diagonal[t, which - MASS] else n + 1
-    return model.body_types.blocks[model.body_types.block0[t, which] + k * step]
 
 
 @inner

@@ -19,41 +19,39 @@ from floatframe.engine.kernels.body import (
     block,
     column,
     column_sum,
+    constant_products,
     coupling,
+    inertia_rate,
     modal_matrix,
+    modal_term,
+    shape_moments,
     tensor,
     tensor_sum,
     trace_less,
 )
 from floatframe.engine.kernels.compiler.compilation import inner, loops
-from floatframe.engine.kernels.dense import add_products
+from floatframe.engine.kernels.model import C2, C3, DAMPING, K_TRANSLATION, MASS, S_AB, STIFFNESS
 from floatframe.engine.kernels.rotation import matrix_of_euler_parameters
 from floatframe.engine.kernels.vector import (
     add,
     cross,
     dot,
     matrix,
+    matrix_sum,
     product,
     put,
     put_matrix,
     put_sum,
     scaled,
+    scaled_matrix,
     sub,
     turned,
     turned_back,
     vector,
 )
 from floatframe.engine.structure_preserving.kernels.records import (
-    BENT,
-    C1,
-    C2,
-    DAMPING,
     FILTER,
     FREE_TURNING,
-    INERTIA,
-    MASS,
-    PRODUCTS,
-    STIFFNESS,
     STIFFNESS_FILTER,
     TURNED_PRODUCTS,
     VARIATIONAL,
@@ -76,66 +74,34 @@ def cayley(theta):
 
 
 @loops
-def shapes(discrete, t, n, q, out):
-    """Write 1C(q) divided by the mass, [a, k], the derivative of the centre of mass by q."""
-    C = block(discrete, t, C1, 3 * n)
+def center(types, t, n, q, C):
+    """Return the centre of mass s(q)/m in the body; write its derivative by q, 1C(q)/m, into C, (3 n,)."""
+    s, f = shape_moments(types, t, n, q, C), 1.0 / types.mass[t]
     for k in range(3 * n):
-        out[k] = C[k]
-    if discrete.is_bent[t]:
-        add_products(block(discrete, t, BENT, 3 * n * n), q, out[: 3 * n])
+        C[k] *= f
+    return scaled(f, s)
 
 
 @loops
-def center(discrete, t, n, q, C):
-    """Return the centre of mass s(q)/m in the body, for C from `shapes`."""
-    s = vector(discrete.center[t])
-    both = add(column_sum(block(discrete, t, C1, 3 * n), n, q), column_sum(C, n, q))
-    return add(s, scaled(0.5, both))
-
-
-@loops
-def products(discrete, t, n, q, which, out):
-    """Write the products V_ab,k = Σ_l S_ab,kl q_l."""
-    for k in range(9 * n):
-        out[k] = 0.0
-    add_products(block(discrete, t, which, 9 * n * n), q, out[: 9 * n])
-
-
-@loops
-def matrix_product(discrete, t, which, n, x, out):
-    """Write the product A x with a stored matrix A, (n, n)."""
-    A = modal_matrix(discrete, t, which, n)
-    for i in range(n):
-        total = 0.0
-        for j in range(n):
-            total += A[i, j] * x[j]
-        out[i] = total
-
-
-@loops
-def momenta(model, discrete, step, t, n, q, omega, q_dot, Y):
+def momenta(types, step, t, n, q, omega, q_dot, Y):
     """Return the angular momentum Pi, and write the modal momenta Y, (n,)."""
-    J = matrix(model.body_types.J0[t])
-    Pi = turned(J, omega)
-    s = vector(discrete.center[t])
-    m = model.body_types.mass[t]
+    V, C = step.V[: 9 * n], step.C[: 3 * n]
+    s = shape_moments(types, t, n, q, C)
+    a = scaled(1.0 / types.mass[t], add(cross(omega, s), column_sum(C, n, q_dot)))
+    Pi = sub(turned(types.J0[t], omega), cross(s, a))
     if n == 0:
-        return sub(Pi, cross(s, scaled(m, cross(omega, s))))
-    V, C = step.V, step.C
-    products(discrete, t, n, q, PRODUCTS, V)
-    shapes(discrete, t, n, q, C)
-    s = center(discrete, t, n, q, C)
-    a = scaled(m, add(cross(omega, s), column_sum(C, n, q_dot)))
-    Pi = sub(Pi, cross(s, a))
-    C_2, J_k = block(discrete, t, C2, 3 * n), block(discrete, t, INERTIA, 9 * n)
-    matrix_product(discrete, t, MASS, n, q_dot, Y)
+        return Pi
+    constant_products(types, t, S_AB, q, V)
+    Y[:] = 0.0
+    modal_term(types, t, n, MASS, 1.0, q_dot, Y)
+    second = block(types, t, C2, 3 * n)
     for k in range(n):
-        B = coupling(C_2, V, n, k)
+        B = coupling(second, V, n, k)
         Y[k] += dot(B, omega) - dot(column(C, n, k), a)
         Pi = add(Pi, scaled(q_dot[k], B))
-        Pi = add(Pi, scaled(q[k], turned(matrix(J_k[9 * k : 9 * k + 9].reshape((3, 3))), omega)))
-    P = trace_less(tensor_sum(V, n, q))
-    return add(Pi, scaled(0.5, add(turned(P, omega), turned_back(P, omega))))
+    third = tensor_sum(block(types, t, C3, 9 * n), n, q)
+    G = matrix_sum(third, scaled_matrix(0.5, trace_less(tensor_sum(V, n, q))))  # J = J0 + G + Gᵀ
+    return add(Pi, add(turned(G, omega), turned_back(G, omega)))
 
 
 class ModalMotion(NamedTuple):
@@ -147,34 +113,30 @@ class ModalMotion(NamedTuple):
 
 
 @loops
-def inertia_force(model, discrete, step, t, n, start, end, q_mean, C_mean, out):
+def inertia_force(types, discrete, step, t, n, start, end, q_mean, C_mean, out):
     """Write N_k, (n,), the modal inertia force 1/2 w_0ᵀ M_c,k w_1 between two motions."""
     (q_0, omega_0, rate_0), (q_1, omega_1, rate_1) = start, end
-    m = model.body_types.mass[t]
-    V, W, C = step.V, step.W, step.C
-    products(discrete, t, n, q_mean, PRODUCTS, V)
-    J_k = block(discrete, t, INERTIA, 9 * n)
+    m, V, W, C = types.mass[t], step.V[: 9 * n], step.W[: 9 * n], step.C[: 3 * n]
+    constant_products(types, t, S_AB, q_mean, V)
+    third = block(types, t, C3, 9 * n)
     for k in range(n):
-        J, T = matrix(J_k[9 * k : 9 * k + 9].reshape((3, 3))), trace_less(tensor(V, n, k))
-        out[k] = dot(omega_0, add(turned(J, omega_1), add(turned(T, omega_1), turned_back(T, omega_1))))
-    shapes(discrete, t, n, q_0, C)
-    s_0, a_rate_0, a_rate_1 = center(discrete, t, n, q_0, C), column_sum(C, n, rate_0), column_sum(C, n, rate_1)
-    shapes(discrete, t, n, q_1, C)
-    s_mean = scaled(0.5, add(s_0, center(discrete, t, n, q_1, C)))
+        D = inertia_rate(third, V, n, k)
+        out[k] = dot(omega_0, add(turned(D, omega_1), turned_back(D, omega_1)))
+    s_0 = center(types, t, n, q_0, C)
+    a_rate_0, a_rate_1 = column_sum(C, n, rate_0), column_sum(C, n, rate_1)
+    s_mean = scaled(0.5, add(s_0, center(types, t, n, q_1, C)))
     a_rate_0 = scaled(0.5, add(a_rate_0, column_sum(C, n, rate_0)))
     a_rate_1 = scaled(0.5, add(a_rate_1, column_sum(C, n, rate_1)))
     for turn in range(2):
         omega, other = (omega_0, omega_1) if turn == 0 else (omega_1, omega_0)
         other_rate = rate_1 if turn == 0 else rate_0
-        a = scaled(m, add(cross(omega, s_mean), a_rate_0 if turn == 0 else a_rate_1))
-        products(discrete, t, n, other_rate, TURNED_PRODUCTS, W)
-        across = cross(a, other)
+        a = add(cross(omega, s_mean), a_rate_0 if turn == 0 else a_rate_1)
+        constant_products(discrete, t, TURNED_PRODUCTS, other_rate, W)
+        across = scaled(m, cross(a, other))
         for k in range(n):
             out[k] += dot(omega, axial(tensor(W, n, k))) - dot(column(C_mean, n, k), across)
-        if discrete.is_bent[t]:
-            for k in range(3 * n):
-                C[k] = 0.0
-            add_products(block(discrete, t, BENT, 3 * n * n), other_rate, C[: 3 * n])
+        if types.is_stiffened[t]:
+            constant_products(types, t, K_TRANSLATION, other_rate, C)
             for k in range(n):
                 out[k] -= dot(column(C, n, k), a)
     for k in range(n):
@@ -182,7 +144,7 @@ def inertia_force(model, discrete, step, t, n, start, end, q_mean, C_mean, out):
 
 
 @inner
-def begin_bodies(model, discrete, step, memory):
+def begin_bodies(model, step, memory):
     """Write centres of mass, velocities and momenta of all bodies for the state in the memory."""
     for i in range(model.bodies.kind.shape[0]):
         t, n, q0, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
@@ -193,24 +155,23 @@ def begin_bodies(model, discrete, step, memory):
         q, q_dot, omega = memory.q[q0 : q0 + n], memory.u[u0 + 6 : u0 + 6 + n], vector(memory.u[u0 + 3 :])
         for k in range(n):
             step.q_0[q0 + k] = q[k]
-        shapes(discrete, t, n, q, step.C)
-        s = center(discrete, t, n, q, step.C)
+        s = center(model.body_types, t, n, q, step.C)
         put(step.s_0[i], 0, s)
         put(step.c_0[i], 0, add(vector(memory.r[i]), turned(R, s)))
         a = add(cross(omega, s), column_sum(step.C, n, q_dot))
         put(step.w_0, u0, add(vector(memory.u[u0:]), turned(R, a)))
         for k in range(u0 + 3, u0 + 6 + n):
             step.w_0[k] = memory.u[k]
-        put_momenta(model, discrete, step, i, q, step.w_0, step.P_0)
+        put_momenta(model, step, i, q, step.w_0, step.P_0)
 
 
 @inner
-def put_momenta(model, discrete, step, i, q, w, P):
+def put_momenta(model, step, i, q, w, P):
     """Write the momenta m v, Pi and Y of body i for velocities w."""
     t, n, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.u0[i]
     put(P, u0, scaled(model.body_types.mass[t], vector(w[u0:])))
     omega, q_dot = vector(w[u0 + 3 :]), w[u0 + 6 : u0 + 6 + n]
-    put(P, u0 + 3, momenta(model, discrete, step, t, n, q, omega, q_dot, P[u0 + 6 : u0 + 6 + n]))
+    put(P, u0 + 3, momenta(model.body_types, step, t, n, q, omega, q_dot, P[u0 + 6 : u0 + 6 + n]))
 
 
 @inner
@@ -234,7 +195,7 @@ def move_bodies(model, step):
 
 
 @inner
-def keep_bodies(model, discrete, step, memory):
+def keep_bodies(model, step, memory):
     """Write the final configuration, with velocities w_1, into the memory."""
     for i in range(model.bodies.kind.shape[0]):
         t, n, q0, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
@@ -244,8 +205,7 @@ def keep_bodies(model, discrete, step, memory):
         for k in range(n):
             memory.q[q0 + k] = q[k]
         R = matrix(step.R_0[i])
-        shapes(discrete, t, n, q, step.C)
-        s = center(discrete, t, n, q, step.C)
+        s = center(model.body_types, t, n, q, step.C)
         put(memory.r[i], 0, sub(vector(step.c_0[i]), turned(R, s)))
         a = add(cross(omega, s), column_sum(step.C, n, q_dot))
         put(memory.u, u0, sub(vector(step.w_1[u0:]), turned(R, a)))
@@ -254,14 +214,14 @@ def keep_bodies(model, discrete, step, memory):
 
 
 @inner
-def body_step(model, discrete, step, i):
+def body_step(model, step, i):
     """Compute the motion of body i over the step from its unknowns.
 
     Forces of the variational scheme act at one configuration, where the angular velocity is (1 + theta²/4) theta/h. For
     rotations about a principal axis it belongs exactly to the momentum of the interval.
     """
     t, n, q0, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
-    R, theta = matrix(step.R_0[i]), vector(step.z[u0 + 3 :])
+    types, R, theta = model.body_types, matrix(step.R_0[i]), vector(step.z[u0 + 3 :])
     put(step.d[i], 0, turned(R, vector(step.z[u0:])))
     is_interval = step.is_still and step.is_closing < 2
     turn = scaled(1.0 + 0.25 * dot(theta, theta), theta) if is_interval else theta
@@ -280,12 +240,8 @@ def body_step(model, discrete, step, i):
             step.q_1[q0 + k] = step.q_0[q0 + k] + dq
         step.q_mean[q0 + k] = step.q_0[q0 + k] + (0.0 if step.is_still else 0.5 * dq)
     if not step.is_closing:
-        q = step.q_1[q0 : q0 + n]
-        shapes(discrete, t, n, q, step.C)
-        put(step.s_1[i], 0, center(discrete, t, n, q, step.C))
-    q, C = step.q_mean[q0 : q0 + n], step.C_mean[3 * q0 : 3 * q0 + 3 * n]
-    shapes(discrete, t, n, q, C)
-    put(step.s_mean[i], 0, center(discrete, t, n, q, C))
+        put(step.s_1[i], 0, center(types, t, n, step.q_1[q0 : q0 + n], step.C))
+    put(step.s_mean[i], 0, center(types, t, n, step.q_mean[q0 : q0 + n], step.C_mean[3 * q0 : 3 * q0 + 3 * n]))
 
 
 @inner
@@ -298,7 +254,7 @@ def end_rates(model, discrete, step, i):
     if n == 0 or not discrete.is_filtered:
         return
     omega, x, Y = vector(step.w_1[u0 + 3 :]), step.w_1[u0 + 6 : u0 + 6 + n], step.vector[:n]
-    Pi = momenta(model, discrete, step, t, n, step.q_1[q0 : q0 + n], omega, x, Y)
+    Pi = momenta(model.body_types, step, t, n, step.q_1[q0 : q0 + n], omega, x, Y)
     turning = sub(Pi, vector(step.P_0[u0 + 3 :]))
     F, E = modal_matrix(discrete, t, FILTER, n), block(discrete, t, FREE_TURNING, 3 * n)
     for k in range(n):
@@ -322,7 +278,7 @@ def body_inertia(model, discrete, step, i):
         rate, Y = step.w_1[u0 + 6 : u0 + 6 + n], step.P_1[u0 + 6 : u0 + 6 + n]
         for k in range(n):
             rate[k] = step.z[u0 + 6 + k] / h
-        Pi = momenta(model, discrete, step, t, n, q, omega, rate, Y)
+        Pi = momenta(model.body_types, step, t, n, q, omega, rate, Y)
         put(out, u0, sub(scaled(m, vector(step.z[u0:])), scaled(h, turned_back(R, vector(step.P_0[u0:])))))
         put(out, u0 + 3, scaled(h, sub(Pi, vector(step.P_0[u0 + 3 :]))))
         for k in range(n):
@@ -340,7 +296,7 @@ def body_inertia(model, discrete, step, i):
             out[u0 + 6 + k] = h * (step.P_1[u0 + 6 + k] - step.P_0[u0 + 6 + k]) - 0.5 * h * h * N[k]
         return
     end_rates(model, discrete, step, i)
-    put_momenta(model, discrete, step, i, step.q_1[q0 : q0 + n], step.w_1, step.P_1)
+    put_momenta(model, step, i, step.q_1[q0 : q0 + n], step.w_1, step.P_1)
     Pi = vector(step.P_1[u0 + 3 :])
     turning = add(sub(Pi, Pi_0), scaled(0.5, cross(theta, add(Pi, Pi_0))))
     put(out, u0 + 3, scaled(0.5 * h, turning))
@@ -349,16 +305,16 @@ def body_inertia(model, discrete, step, i):
     q_mean = step.q_mean[q0 : q0 + n]
     start = ModalMotion(step.q_0[q0 : q0 + n], vector(step.w_0[u0 + 3 :]), step.w_0[u0 + 6 : u0 + 6 + n])
     end = ModalMotion(step.q_1[q0 : q0 + n], vector(step.w_1[u0 + 3 :]), step.w_1[u0 + 6 : u0 + 6 + n])
-    inertia_force(model, discrete, step, t, n, start, end, q_mean, C_mean, N)
-    subtract_elastic(discrete, step, t, n, q_mean, step.dq[q0 : q0 + n], N)
+    inertia_force(model.body_types, discrete, step, t, n, start, end, q_mean, C_mean, N)
+    subtract_elastic(model.body_types, discrete, step, t, n, q_mean, step.dq[q0 : q0 + n], N)
     for k in range(n):
         out[u0 + 6 + k] = 0.5 * h * (step.P_1[u0 + 6 + k] - step.P_0[u0 + 6 + k]) - 0.5 * h * h * N[k]
 
 
 @loops
-def subtract_elastic(discrete, step, t, n, q_mean, dq, N):
+def subtract_elastic(types, discrete, step, t, n, q_mean, dq, N):
     """Subtract elastic forces K q and damping forces D dq/h from the modal forces, with numerical dissipation in q."""
-    K, D, q = modal_matrix(discrete, t, STIFFNESS, n), modal_matrix(discrete, t, DAMPING, n), step.vector
+    q = step.vector[:n]
     for k in range(n):
         q[k] = q_mean[k]
     if discrete.is_filtered:
@@ -366,11 +322,8 @@ def subtract_elastic(discrete, step, t, n, q_mean, dq, N):
         for k in range(n):
             for j in range(n):
                 q[k] += X[k, j] * dq[j]
-    for k in range(n):
-        total = 0.0
-        for j in range(n):
-            total += K[k, j] * q[j] + D[k, j] * dq[j] / step.h
-        N[k] -= total
+    modal_term(types, t, n, STIFFNESS, -1.0, q, N)
+    modal_term(types, t, n, DAMPING, -1.0 / step.h, dq, N)
 
 
 @inner
@@ -381,10 +334,10 @@ def interval(model, discrete, step, i):
     for k in range(n):
         rate[k] = step.dq[q0 + k] / h
         q[k] = step.q_0[q0 + k] + 0.5 * step.dq[q0 + k]
-    put(step.P_1, u0 + 3, momenta(model, discrete, step, t, n, q, omega, rate, step.P_1[u0 + 6 : u0 + 6 + n]))
+    put(step.P_1, u0 + 3, momenta(model.body_types, step, t, n, q, omega, rate, step.P_1[u0 + 6 : u0 + 6 + n]))
     if n:
         C = step.C_interval
-        shapes(discrete, t, n, q, C)
+        center(model.body_types, t, n, q, C)
         middle = ModalMotion(q, omega, rate)
-        inertia_force(model, discrete, step, t, n, middle, middle, q, C, step.force)
-        subtract_elastic(discrete, step, t, n, q, step.dq[q0 : q0 + n], step.force)
+        inertia_force(model.body_types, discrete, step, t, n, middle, middle, q, C, step.force)
+        subtract_elastic(model.body_types, discrete, step, t, n, q, step.dq[q0 : q0 + n], step.force)

@@ -40,7 +40,7 @@ from floatframe.engine.kernels.joints.deformed_line import (
     twist,
     unit_normal,
 )
-from floatframe.engine.kernels.joints.relative_motion import direction
+from floatframe.engine.kernels.joints.relative_motion import direction, distance
 from floatframe.engine.kernels.marker import shape
 from floatframe.engine.kernels.rotation import exp_matrix
 from floatframe.engine.kernels.vector import (
@@ -236,7 +236,7 @@ def line_value(model, step, k, a, b):
         return dot(E, D)
     along, y = vector(step.line_end[model.markers.line[a]]), direction(step.end.markers, a, unit(1))
     n = unit_normal(model.rows.part[k], scaled(1.0 / norm(along), along), y)
-    return dot(n, sub(vector(step.end.markers.r[b]), vector(step.end.markers.r[a])))
+    return dot(n, distance(step.end.markers, a, b))
 
 
 @inner

@@ -130,8 +130,7 @@ def marker_step(model, discrete, step, m):
         if o >= 0:
             bent_shapes(model, m, n, step.q_mean[q0 : q0 + n], 1.0, psi)
         else:
-            for k in range(6 * n):
-                psi[k] = 0.0
+            psi[: 6 * n] = 0.0
         for k in range(3 * n):
             psi[k] -= C[k]
         dx = add(dx, turned(R_m, column_sum(psi, n, dq)))

@@ -6,6 +6,7 @@ Each value is in its own row of the memory; the other rows contain wrenches of t
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.contact import V_0
 from floatframe.engine.kernels.model import CONTACT
+from floatframe.engine.kernels.vector import copy
 from floatframe.engine.structure_preserving.kernels.connections.contacts import speed_of_approach
 from floatframe.engine.structure_preserving.kernels.coordinates import ends_of_step
 
@@ -15,8 +16,7 @@ __all__ = ["expect_angles", "keep", "recall", "remember"]
 @inner
 def recall(memory, step):
     """Read the remembered values at the start of the step."""
-    for k in range(step.known.shape[0]):
-        step.known[k] = memory.w[k]
+    copy(memory.w, step.known)
 
 
 @inner

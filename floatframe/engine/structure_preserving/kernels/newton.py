@@ -11,7 +11,7 @@ import math
 from floatframe.engine.kernels.compiler.compilation import inner, matrix_loops
 from floatframe.engine.kernels.generalized_alpha import DIVERGED, DONE, SINGULAR
 from floatframe.engine.kernels.model import BUSHING, CONTACT, ELEMENT, JOINT, SPRING, USER_FORCE
-from floatframe.engine.kernels.vector import cross, matrix, norm, put_sum, scaled, sub, turned_back, vector
+from floatframe.engine.kernels.vector import copy, cross, matrix, norm, put_sum, scaled, sub, turned_back, vector
 from floatframe.engine.structure_preserving.kernels.bodies import body_inertia, body_step
 from floatframe.engine.structure_preserving.kernels.connections.contacts import contact_load
 from floatframe.engine.structure_preserving.kernels.connections.forces import (
@@ -113,12 +113,11 @@ ROUNDOFF = 2e-15  # relative roundoff of a position
 def move(model, discrete, step):
     """Compute the motion of bodies and markers over the step from the unknowns."""
     for i in range(model.bodies.kind.shape[0]):
-        body_step(model, discrete, step, i)
+        body_step(model, step, i)
     for m in range(model.markers.body.shape[0]):
         marker_step(model, discrete, step, m)
     line_steps(model, discrete, step)
-    for k in range(step.load.shape[0]):
-        step.load[k] = 0.0
+    step.load[:] = 0.0
 
 
 @inner
@@ -248,12 +247,10 @@ def put_changes(model, discrete, step):
 @inner
 def factorize(model, work, discrete, step, stage):
     """Factorise the derivatives of the residual; return whether they are regular."""
-    pattern, A, n = discrete.pattern, step.band[stage], step.z.shape[0]
+    pattern, A = discrete.pattern, step.band[stage]
     below, above = pattern.below, pattern.above
-    for i in range(n):
-        step.base[i] = step.residual[i]
-        for j in range(A.shape[1]):
-            A[i, j] = 0.0
+    copy(step.residual, step.base)
+    A[:, :] = 0.0
     put_changes(model, discrete, step)
     for color in range(pattern.color0.shape[0] - 1):
         first, last = pattern.color0[color], pattern.color0[color + 1]
@@ -269,8 +266,7 @@ def factorize(model, work, discrete, step, stage):
                 i = pattern.row[r]
                 row = pattern.place[i]
                 A[row, below + column - row] = factor * discrete.row_scale[i] * (step.residual[i] - step.base[i])
-    for i in range(n):
-        step.residual[i] = step.base[i]
+    copy(step.base, step.residual)
     step.n_factors += 1
     return band_factor(A, step.band_pivot[stage], below, above)
 

@@ -13,17 +13,14 @@ from floatframe.engine.kernels.records import Size, integer, real, tabled
 from floatframe.engine.kernels.work import n_most
 
 __all__ = [
-    "BENT", "C1", "C2", "CONSERVING", "DAMPING", "FILTER", "FREE_TURNING", "INERTIA", "MASS", "N_BLOCKS", "PRODUCTS",
-    "SMALL", "STIFFNESS", "STIFFNESS_FILTER", "TURNED_PRODUCTS", "VARIATIONAL", "Discrete", "Pattern", "StepWork",
+    "CONSERVING", "FILTER", "FREE_TURNING", "N_BLOCKS", "SMALL", "STIFFNESS_FILTER", "TURNED_PRODUCTS", "VARIATIONAL",
+    "Discrete", "Pattern", "StepWork",
 ]  # fmt: skip
 
 CONSERVING, VARIATIONAL = range(2)
-#: columns of `Discrete.block0`, one for each constant array: C1, K_t, C2, J_k, S_ab, S_ab_T, M, K and D of
-#: `bodies.CentralBody`, then F, X and E of `Filter`
-(
-    C1, BENT, C2, INERTIA, PRODUCTS, TURNED_PRODUCTS, MASS, STIFFNESS, DAMPING, FILTER, STIFFNESS_FILTER, FREE_TURNING,
-) = range(12)  # fmt: skip
-N_BLOCKS = 12
+#: columns of `Discrete.block0`, one for each constant array: S_ab_T of `bodies.CentralBody`; F, X and E of `Filter`
+TURNED_PRODUCTS, FILTER, STIFFNESS_FILTER, FREE_TURNING = range(4)
+N_BLOCKS = 4
 #: difference step for unknowns, relative to the size of the system, in rad, or relative to the size of the unknown
 SMALL = 1e-7
 
@@ -49,8 +46,6 @@ class Discrete(NamedTuple):
     """A system in the arrays of the compiled steps."""
 
     scheme: IntArray = integer()  #: CONSERVING or VARIATIONAL
-    center: Array = real(n_t, 3, unit="m")  #: undeformed centre of mass in the body frame
-    is_bent: IntArray = integer(n_t)  #: whether 1C depends on q
     is_filtered: IntArray = integer()  #: whether unresolved modes have numerical dissipation
     is_loaded: IntArray = integer()  #: whether forces or drives do work
     blocks: Array = real(Size("numbers of steps"))
@@ -122,11 +117,11 @@ class StepWork(NamedTuple):
     q_1: Array = real(n_q)
     q_mean: Array = real(n_q)
     dq: Array = real(n_q)
-    V: Array = real(9 * n_most, unit="kg m²")  #: result of `kernels.bodies.products`
+    V: Array = real(9 * n_most, unit="kg m²")  #: products W_ab = S_ab q
     W: Array = real(9 * n_most, unit="kg m²")
-    C: Array = real(3 * n_most)  #: result of `kernels.bodies.shapes`
-    C_mean: Array = real(3 * n_q)  #: result of `kernels.bodies.shapes` at q_mean, for each body
-    C_interval: Array = real(3 * n_most)  #: result of `kernels.bodies.shapes` in the middle of a variational step
+    C: Array = real(3 * n_most)  #: derivative of the centre of mass by q, see `kernels.bodies.center`
+    C_mean: Array = real(3 * n_q)  #: the same at q_mean, for each body
+    C_interval: Array = real(3 * n_most)  #: the same in the middle of a variational step
     middle: Array = real(n_most)  #: modal coordinates in the middle of a variational step
     force: Array = real(n_most)
     vector: Array = real(n_most)

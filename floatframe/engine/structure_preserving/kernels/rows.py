@@ -10,7 +10,7 @@ angular momentum.
 import math
 
 from floatframe.engine.kernels.compiler.compilation import inner
-from floatframe.engine.kernels.joints.relative_motion import prescribed_at
+from floatframe.engine.kernels.joints.relative_motion import distance, prescribed_at
 from floatframe.engine.kernels.joints.row_formulas import HELD, by_code
 from floatframe.engine.kernels.vector import add, cross, dot, scaled, sub, turned, vector
 from floatframe.engine.structure_preserving.kernels.markers import add_direction, add_pair, ends
@@ -88,7 +88,7 @@ def mean_direction(step, m, e):
 def row_value(model, step, k, a, b):
     """Return the value of row k at the end of the step."""
     if model.rows.kind[k] == POINT:
-        d = sub(vector(step.end.markers.r[b]), vector(step.end.markers.r[a]))
+        d = distance(step.end.markers, a, b)
         return dot(d, point_axis(model, step, k, a, b))
     value, _, _, _ = value_of_places(model.rows.kind[k], model, step.end, k, a, b)
     return value

@@ -3,25 +3,36 @@
 Described in `floatframe.integrators.energy_momentum`, `floatframe.integrators.variational`.
 """
 
-from floatframe.engine.kernels.body import modal_matrix
 from floatframe.engine.kernels.compiler.compilation import inner, kept_entry
 from floatframe.engine.kernels.compiler.structure import converter
 from floatframe.engine.kernels.connections.contact import contact_gap
 from floatframe.engine.kernels.connections.gap import next_step
+from floatframe.engine.kernels.diagnostics import quadratic
 from floatframe.engine.kernels.entry import CompiledEntry, Order
 from floatframe.engine.kernels.generalized_alpha import (
     DONE,
     NO_ACCELERATION,
     STOPPED,
     UNRESOLVED,
-    copy,
     load_state,
     time_loop,
 )
 from floatframe.engine.kernels.memory import GIVEN, TAKEN, Memory, Rows
-from floatframe.engine.kernels.model import Model
+from floatframe.engine.kernels.model import DAMPING, Model
 from floatframe.engine.kernels.turns import count_turns
-from floatframe.engine.kernels.vector import add, cross, dot, matrix, put, scaled, sub, turned, turned_back, vector
+from floatframe.engine.kernels.vector import (
+    add,
+    copy,
+    cross,
+    dot,
+    matrix,
+    put,
+    scaled,
+    sub,
+    turned,
+    turned_back,
+    vector,
+)
 from floatframe.engine.kernels.work import Work
 from floatframe.engine.structure_preserving.kernels.bodies import (
     begin_bodies,
@@ -41,7 +52,7 @@ from floatframe.engine.structure_preserving.kernels.newton import (
     solve,
 )
 from floatframe.engine.structure_preserving.kernels.observation import observe
-from floatframe.engine.structure_preserving.kernels.records import CONSERVING, DAMPING, Discrete, StepWork
+from floatframe.engine.structure_preserving.kernels.records import CONSERVING, Discrete, StepWork
 
 __all__ = ["advance", "discrete_kernels"]
 
@@ -78,23 +89,18 @@ def learn(model, discrete, step):
         put(step.acceleration, u0, scaled(1.0 / step.h, dv))
         for k in range(u0 + 3, u0 + 6 + n):
             step.acceleration[k] = (step.w_1[k] - step.w_0[k]) / step.h
-    for j in range(step.f.shape[0]):
-        step.f_kept[j] = step.f[j]
+    copy(step.f, step.f_kept)
     for e in range(discrete.equation.shape[0]):
         j = discrete.equation[e]
         step.f_size[j] = max(FADING * step.f_size[j], abs(step.f[j]))
 
 
 @inner
-def work_of_dampers(model, discrete, step):
+def work_of_dampers(model, work, step):
     """Return the work dissipated by modal damping."""
     total = 0.0
     for i in range(model.bodies.kind.shape[0]):
-        t, n, q0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i]
-        D = modal_matrix(discrete, t, DAMPING, n)
-        for k in range(n):
-            for j in range(n):
-                total += step.dq[q0 + k] * D[k, j] * step.dq[q0 + j]
+        total += quadratic(model, work, i, DAMPING, step.dq[model.bodies.q0[i] : model.bodies.q0[i + 1]])
     return total / step.h
 
 
@@ -112,7 +118,7 @@ def begin(model, discrete, step, memory):
     """Write the known quantities at the start of the step."""
     recall(memory, step)
     expect_angles(memory, step)
-    begin_bodies(model, discrete, step, memory)
+    begin_bodies(model, step, memory)
     begin_markers(model, discrete, step)
     begin_lines(model, step)
 
@@ -148,12 +154,12 @@ def conserving_step(model, work, discrete, step, memory, order):
     for i in range(model.bodies.kind.shape[0]):
         end_rates(model, discrete, step, i)
     memory.work[GIVEN] += step.given
-    memory.work[TAKEN] += step.taken + work_of_dampers(model, discrete, step)
+    memory.work[TAKEN] += step.taken + work_of_dampers(model, work, step)
     learn(model, discrete, step)
     remember(model, discrete, step)
     keep(discrete, step, memory)
     move_bodies(model, step)
-    keep_bodies(model, discrete, step, memory)
+    keep_bodies(model, step, memory)
     return status
 
 
@@ -181,13 +187,13 @@ def variational_step(model, work, discrete, step, memory, order):
     work.counted.stopped = 0
     add_loads(model, work, discrete, step)
     add_drives(model, discrete, step)
-    dampers = work_of_dampers(model, discrete, step)
+    dampers = work_of_dampers(model, work, step)
     given, taken = step.given, step.taken
-    learn_multipliers(step)
+    copy(step.f, step.kept)  # the initial guess of the next step
     remember(model, discrete, step)
     for i in range(model.bodies.kind.shape[0]):
         interval(model, discrete, step, i)
-        put_elastic(model, step, i)
+        copy(step.force[: model.bodies.n_q[i]], step.elastic[model.bodies.u0[i] + 6 :])
     move_bodies(model, step)
     step.t_force = step.end.state.time
     expect_angles(memory, step)
@@ -199,8 +205,7 @@ def variational_step(model, work, discrete, step, memory, order):
     for m in range(model.markers.body.shape[0]):
         marker_loads(model, discrete, step, m)
     given, taken = given + step.given, taken + step.taken
-    for j in range(step.f.shape[0]):
-        step.f[j] = 0.0
+    step.f[:] = 0.0
     for c in range(model.connections.size.shape[0]):
         for j in range(discrete.first[c], discrete.first[c + 1]):
             if discrete.is_driven[j]:
@@ -217,8 +222,7 @@ def variational_step(model, work, discrete, step, memory, order):
     step.is_closing = 2
     status = solve(model, work, discrete, step, order, 1, False)
     if status != DONE:
-        for k in range(step.z.shape[0]):
-            step.z[k] = 0.0
+        step.z[:] = 0.0
         status = solve(model, work, discrete, step, order, 1, True)
         if status != DONE:
             return status
@@ -234,26 +238,10 @@ def variational_step(model, work, discrete, step, memory, order):
     memory.work[GIVEN] += 0.5 * given
     memory.work[TAKEN] += 0.5 * taken + dampers
     learn(model, discrete, step)
-    for j in range(step.f.shape[0]):
-        step.f_kept[j] = step.kept[j]
+    copy(step.kept, step.f_kept)
     keep(discrete, step, memory)
-    keep_bodies(model, discrete, step, memory)
+    keep_bodies(model, step, memory)
     return status
-
-
-@inner
-def learn_multipliers(step):
-    """Store the multipliers of the position stage as the next step's initial guess."""
-    for j in range(step.f.shape[0]):
-        step.kept[j] = step.f[j]
-
-
-@inner
-def put_elastic(model, step, i):
-    """Store the modal forces at mid-step."""
-    u0, n = model.bodies.u0[i], model.bodies.n_q[i]
-    for k in range(n):
-        step.elastic[u0 + 6 + k] = step.force[k]
 
 
 @inner

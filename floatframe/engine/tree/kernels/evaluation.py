@@ -3,8 +3,8 @@
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.connection import connection_rows
 from floatframe.engine.kernels.evaluation import evaluate_bodies, evaluate_markers, slide_markers
-from floatframe.engine.kernels.generalized_alpha import copy
 from floatframe.engine.kernels.marker import marker_motion
+from floatframe.engine.kernels.vector import copy
 from floatframe.engine.tree.kernels.projection import project
 
 __all__ = ["evaluate_placed", "evaluate_tree"]

@@ -7,7 +7,7 @@ equation of the coordinate. The remaining modal residuals are the equations of t
 
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.joints.coordinate_force import coordinate_force
-from floatframe.engine.kernels.joints.relative_motion import loaded_coordinate
+from floatframe.engine.kernels.joints.relative_motion import distance, loaded_coordinate
 from floatframe.engine.kernels.marker import wrench_to_body
 from floatframe.engine.kernels.vector import add, cross, dot, put, scaled, sub, turned, vector
 from floatframe.model.joints.rows.kinds import PUSH
@@ -37,7 +37,7 @@ def project(model, work, tree, joints):
             put(wrench[far], 0, F)
             put(wrench[far], 3, N)
             wrench_to_body(model, work, far)
-            D = sub(vector(work.markers.r[far]), vector(work.markers.r[near]))
+            D = distance(work.markers, near, far)
             back = scaled(-1.0, add(N, cross(D, F)))
             put(wrench[near], 0, scaled(-1.0, F))
             put(wrench[near], 3, back)
@@ -99,5 +99,5 @@ def put_reactions(model, work, tree, joints):
         if of_b >= 0:
             put(w, of_b, N)
         if of_a >= 0 and of_a != of_b:
-            D = sub(vector(work.markers.r[b]), vector(work.markers.r[a]))
+            D = distance(work.markers, a, b)
             put(w, of_a, add(N, cross(D, F)))

@@ -8,6 +8,7 @@ Described in `floatframe.integrators.relative`.
 
 import math
 
+from floatframe.engine.kernels.body import modal_term
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.connection import write_velocity_gaps
 from floatframe.engine.kernels.connections.user_force import resize_states
@@ -23,7 +24,6 @@ from floatframe.engine.kernels.generalized_alpha import (
     TURNED,
     UNRESOLVED,
     add_reactions,
-    copy,
     correction_of_states,
     error_factor,
     is_enough,
@@ -36,14 +36,15 @@ from floatframe.engine.kernels.generalized_alpha import (
     ratio_of_steps,
     roundoff_floor,
     settle_row,
-    take_stiffness,
     time_loop,
     write_row,
 )
+from floatframe.engine.kernels.model import STIFFNESS
 from floatframe.engine.kernels.rotation import quaternion_of
 from floatframe.engine.kernels.step_start import hold_states
 from floatframe.engine.kernels.vector import (
     add,
+    copy,
     cross,
     dot,
     matrix,
@@ -214,8 +215,8 @@ def hold_velocities(model, work, tree, joints, tangent, by_rate, by_acceleration
     total = squared_size(model, work, tree, tangent)
     change_joints(work, tree, joints, step, 0.0, by_rate, by_acceleration)
     for i in range(tree.parent.shape[0]):
-        m0, end = tree.m0[i], tree.s0[i + 1]
-        take_stiffness(model, i, step[m0:end], joints.residual[m0:end])
+        t, n, m0, end = model.bodies.kind[i], model.bodies.n_q[i], tree.m0[i], tree.s0[i + 1]
+        modal_term(model.body_types, t, n, STIFFNESS, -1.0, step[m0:end], joints.residual[m0:end])
     for k in range(tree.kept_row.shape[0]):
         mu[k] = tangent.mu[tree.kept_row[k]] if tree.kept_row[k] >= 0 else 0.0
     add_reactions(model, work, c_k)

@@ -13,12 +13,12 @@ from floatframe.engine.kernels.body import moved_inertia, newton_block
 from floatframe.engine.kernels.compiler.compilation import inner, small
 from floatframe.engine.kernels.connections.connection import connection_derivatives
 from floatframe.engine.kernels.evaluation import tangent_of_body
-from floatframe.engine.kernels.generalized_alpha import copy
 from floatframe.engine.kernels.marker import bent_rate
 from floatframe.engine.kernels.vector import (
     add,
     add_column,
     congruent,
+    copy,
     cross,
     dot,
     matrix,

@@ -18,6 +18,7 @@ from floatframe.engine.kernels.records import filled
 from floatframe.engine.tree.kernels.tree import Tree
 from floatframe.engine.tree.recursion.nodes import FIXED, NO_MARKER, ROTATION, SCREW, TRANSLATION, Nodes
 from floatframe.engine.tree.topology import SystemTree, tree_of
+from floatframe.engine.tree.tree_motions import joint_iterate
 from floatframe.model.bodies.added_mass import second_moments
 from floatframe.model.bodies.marker_shape import MarkerShape
 from floatframe.model.joints import FixedJoint, SphericalJoint, UniversalJoint
@@ -27,7 +28,7 @@ from floatframe.model.rotations import euler_parameters, rotation_matrix
 from floatframe.model.state import State
 from floatframe.model.system import System
 
-__all__ = ["Elementary", "Expansion", "expansion_of", "marker_shape", "positions_of_state"]
+__all__ = ["Elementary", "Expansion", "expansion_of", "marker_shape", "positions_and_rates_of_state"]
 
 N_POSITIONS = {FIXED: 0, SCREW: 1, TRANSLATION: 3, ROTATION: 4}
 N_RATES = {FIXED: 0, SCREW: 1, TRANSLATION: 3, ROTATION: 3}
@@ -293,23 +294,18 @@ def carried(model: Model, i: int, F: Array, origin: Array) -> dict:
 # positions of joints from the poses of bodies, and bodies from those of nodes (docs/recursive.md §1) ------------------
 
 
-def positions_of_state(expansion: Expansion, state: State) -> Array:
-    """Return the positions, (n_x,), for a state of the engine whose joints are assumed closed."""
+def positions_and_rates_of_state(expansion: Expansion, state: State) -> tuple[Array, Array]:
+    """Return positions, (n_x,), and rates, (n_v,), for a state of the engine whose joints are assumed closed."""
     compiled, tree = expansion.compiled, expansion.tree.tree
     bodies = compiled.model.bodies
-    x = np.zeros(expansion.n_x)
+    _, joints = joint_iterate(compiled, tree, state)
+    x, v = np.zeros(expansion.n_x), np.zeros(expansion.n_v)
     for i in range(len(bodies.kind)):
-        q = state.q[bodies.q0[i] : bodies.q0[i + 1]]
-        x[expansion.xq_of[i]] = q
-        poses = []
-        for m, body in ((int(tree.near[i]), int(tree.parent[i])), (int(tree.far[i]), i)):
-            R, r = (np.eye(3), np.zeros(3)) if body < 0 else (rotation_matrix(state.p[body]), state.r[body])
-            own = np.zeros(0) if body < 0 else state.q[bodies.q0[body] : bodies.q0[body + 1]]
-            rho, axes = marker_shape(compiled, m).pose(own)
-            poses.append((r + R @ rho, R @ axes))
-        (r_a, A_a), (r_b, A_b) = poses[::-1] if tree.is_reversed[i] else poses
-        x[expansion.x_of[i]] = joint_positions(expansion, i, A_a.T @ (r_b - r_a), A_a.T @ A_b)
-    return x
+        x[expansion.x_of[i]] = joint_positions(expansion, i, joints.d[i], joints.Q[i])
+        v[expansion.z_of[i]] = joints.rate[tree.column0[i] : tree.column0[i + 1]]
+        x[expansion.xq_of[i]] = state.q[bodies.q0[i] : bodies.q0[i + 1]]
+        v[expansion.vq_of[i]] = state.u[bodies.u0[i] + 6 : bodies.u0[i + 1]]
+    return x, v
 
 
 def joint_positions(expansion: Expansion, i: int, d: Array, Q: Array) -> Array:

@@ -77,7 +77,7 @@ def test_place_at_the_start_and_in_discrete_steps_is_that_of_the_results(kind):
     R = rotation_matrix(state.p[0])
     assert_allclose(r_P, state.r[0] + R @ rho, rtol=0, atol=ROUNDOFF)
     assert_allclose(A_P, R @ axes, rtol=0, atol=ROUNDOFF)
-    bodies = step_bodies(central_bodies(compiled.model, ("body",), "test"))
+    bodies = step_bodies(compiled.model, central_bodies(compiled.model, ("body",), "test"))
     own = body_marker(compiled.model, bodies, int(compiled.model.connections.a[0]))
     sigma, theta = own.deformation(state.q)
     assert_allclose(sigma + bodies[0].center(state.q), rho, rtol=0, atol=ROUNDOFF)

@@ -8,15 +8,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.engine.kernels.model import Model
+from floatframe.engine.initial_conditions.newton_equations import modal_matrix, stored_array
+from floatframe.engine.kernels.model import C3, DAMPING, K_TRANSLATION, S_AB, Model
 from floatframe.engine.structure_preserving.bodies import CentralBody
 from floatframe.model.rotations import cross, dot, rotated, rotation_matrix, tilde
 from floatframe.model.state import State
 from tests.floatframe.engine.structure_preserving.in_python.rotation import cayley, cayley_parameters
 
 
+@dataclass(frozen=True, eq=False)
 class Body(CentralBody):
     """Constants of a body, and what follows from them where it is deformed."""
+
+    K_t: Array | None  #: second derivative of S by q [l, a, k], (n, 3 n); None if zero
+    J_k: Array  #: derivative of the inertia by q_k, 3C_k + 3C_kᵀ, (n, 3, 3)
+    S_ab: Array  #: second-order inertia [l, a, b, k], (n, 9 n)
+    D: Array  #: modal damping matrix, (n, n)
 
     def center(self, q: Array) -> Array:
         """Return s(q), from the frame origin to the centre of mass, body axes, (..., 3)."""
@@ -85,10 +92,26 @@ class Body(CentralBody):
         return 0.5 * total
 
 
-def step_bodies(bodies: tuple[CentralBody, ...]) -> tuple[Body, ...]:
+def step_bodies(model: Model, bodies: tuple[CentralBody, ...]) -> tuple[Body, ...]:
     """Return bodies with their functions, one for each type."""
-    made = {id(body): Body(**vars(body)) for body in bodies}
+    made: dict[int, Body] = {}
+    for i, body in enumerate(bodies):
+        if id(body) not in made:
+            made[id(body)] = step_body(model, i, body)
     return tuple(made[id(body)] for body in bodies)
+
+
+def step_body(model: Model, i: int, body: CentralBody) -> Body:
+    """Return body i with its functions."""
+    n, is_bent = body.n, body.n > 0 and bool(model.body_types.is_stiffened[model.bodies.kind[i]])
+    C3_k = np.moveaxis(stored_array(model, i, C3, 3, 3, n), 2, 0)
+    return Body(
+        **vars(body),
+        K_t=stored_array(model, i, K_TRANSLATION, n, 3 * n) / body.m if is_bent else None,
+        J_k=C3_k + np.swapaxes(C3_k, 1, 2),
+        S_ab=stored_array(model, i, S_AB, n, 9 * n),
+        D=modal_matrix(model, i, DAMPING),
+    )
 
 
 def bent(K: Array, x: Array, n_rows: int) -> Array:

@@ -234,7 +234,7 @@ def normal_force(model: Model, k: int, connection: StepConnection, pair: Pair, f
 
 def step_system(ds: DiscreteSystem) -> StepSystem:
     """Return a discrete system whose bodies, markers and connections have functions."""
-    model, bodies = ds.model, step_bodies(ds.bodies)
+    model, bodies = ds.model, step_bodies(ds.model, ds.bodies)
     markers = tuple(body_marker(model, bodies, m) for m in range(len(model.markers.body)))
     connections = []
     for own in ds.connections:
