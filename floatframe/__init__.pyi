@@ -5,6 +5,7 @@ from . import durability as durability
 from . import errors as errors
 from . import files as files
 from . import forces as forces
+from . import functions as functions
 from . import integrators as integrators
 from . import joints as joints
 from . import machines as machines

@@ -28,7 +28,7 @@ from cms.assessment.rendering import Lines, Scene, Surface, render_animation
 from fe_models.foundation.parametric_file import read_parametric
 from floatframe.components import mechanisms
 from floatframe.files.system_file.read_system import read_system
-from floatframe.model.functions.time_functions import cycloidal_spin_up
+from floatframe.functions import cycloidal_spin_up
 from floatframe.pictures.animation import motion_scene
 from floatframe.pictures.film_times import film_times, speed_words
 from floatframe.results.results_file import MemorySource
@@ -154,8 +154,8 @@ def bogie() -> None:
         laws = rails.ContactLaws(creep="fastsim", friction=0.4, strips=8)
         system = vehicle(data, speed, laws=laws, frames=flexible_frames(data, frame, speed))
         system = replace(with_lateral_kick(system, 0.1), scene=())
-        motion = ff.integrate(system, ff.GeneralizedAlpha(0.8, 1e-6), 2.0, 2e-3, output_every=2)
-    rows = motion.t >= 1.0
+        motion = ff.integrate(system, ff.GeneralizedAlpha(0.8, 1e-6), 1.6, 2e-3, output_every=2)  # later a wheel climbs
+    rows = motion.t >= 0.8
     arrays = {key: values[rows] for key, values in motion.source.arrays.items() if len(values) == len(rows)}
     arrays["position"] = (arrays["position"] - motion.body("body").r[rows, None] * [1, 0, 0]) * [1, larger, 1]
     arrays["euler_parameters"] = turned_more(arrays["euler_parameters"], larger)

@@ -15,32 +15,19 @@ NAMES = sorted(path.stem for path in NOTEBOOKS.glob("*.ipynb"))
 PACKAGES = ("fe_models", "cms", "floatframe")
 #: names that notebooks import and that no namespace offers
 NOT_PUBLIC = {
-    "controlled_arm": {
-        "floatframe.model.bodies.mode_choice.with_modes", "floatframe.model.functions.time_functions.constant",
-        "floatframe.model.functions.time_functions.piecewise",
-    },
+    "controlled_arm": {"floatframe.model.bodies.mode_choice.with_modes"},
     "deployable_antenna": {"floatframe.engine.compiling.system.compiled_system"},
     "from_your_fe_program_to_a_motion": {"cms.jobs.body_of_job.job_body", "cms.jobs.job.read_job"},
-    "landing_gear": {"floatframe.model.functions.tables.monotone_table"},
     "motor_bogie": {"floatframe.files.signals.orders.frequency_map", "floatframe.files.signals.signals.Signal"},
     "railway_engine": {"floatframe.design.laboratory.body_figures.error_figure"},
-    "robot": {
-        "floatframe.model.functions.path_motions.path_motion", "floatframe.model.functions.tables.quintic_table",
-    },
-    "slender_beams": {"floatframe.model.functions.time_functions.polynomial_of_time"},
     "spacecraft_tower": {
         "cms.jobs.body_of_job.job_body", "cms.jobs.job.read_job", "floatframe.model.bodies.mode_choice.with_modes",
-        "floatframe.model.functions.tables.acceleration_table",
         "fe_models.foundation.documents.write.write_document", "floatframe.durability.shaking.page.shake_document",
     },
     "suspension_arm": {
         "cms.jobs.body_of_job.job_body", "cms.jobs.job.read_job", "floatframe.model.rotations.rotation_matrix",
         *(f"floatframe.files.signals.{name}"
           for name in ("Signals", "psd", "read_signals", "transfer_estimate", "write_rpc")),
-    },
-    "where_linear_frames_fail": {
-        "floatframe.model.functions.time_functions.cycloidal_spin_up",
-        "floatframe.model.functions.time_functions.polynomial_of_time",
     },
 }  # fmt: skip
 CELL = "for k in range(3):\n    square = k * k\n    print(square)"

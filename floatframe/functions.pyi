@@ -1,0 +1,16 @@
+from .model.functions.path_motions import path_motion as path_motion
+from .model.functions.point_to_point import quintic as quintic
+from .model.functions.point_to_point import trapezoid as trapezoid
+from .model.functions.point_to_point import trapezoids_together as trapezoids_together
+from .model.functions.tables import acceleration_table as acceleration_table
+from .model.functions.tables import linear_table as linear_table
+from .model.functions.tables import monotone_table as monotone_table
+from .model.functions.tables import quintic_table as quintic_table
+from .model.functions.time_functions import constant as constant
+from .model.functions.time_functions import cycloidal_spin_up as cycloidal_spin_up
+from .model.functions.time_functions import harmonic as harmonic
+from .model.functions.time_functions import piecewise as piecewise
+from .model.functions.time_functions import polynomial_of_time as polynomial_of_time
+from .model.functions.time_functions import sampled as sampled
+from .model.functions.time_functions import smooth_step as smooth_step
+from .model.functions.time_functions import table as table
