@@ -147,21 +147,30 @@ def faces_command(
 
 @guarded
 def converge_command(
-    job: Annotated[Path, typer.Argument(help="Job file (TOML) of a CAD file with [mesh_size].")],
+    job: Annotated[Path, typer.Argument(help="Job file (TOML) of a solid or a shell.")],
     ratio: Annotated[float, typer.Option(help="Ratio of the coarser mesh size to that of the job.")] = 1.5,
     modes: Annotated[int, typer.Option(help="Number of elastic free modes to compare.")] = 10,
+    error: Annotated[
+        float, typer.Option(help="Wanted error of the frequencies, for which an element size is proposed.")
+    ] = 0.01,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Picture of where the mesh is too coarse (.png).")
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the numbers as JSON, for other programs.")] = False,
     set_values: SetValues = [],  # noqa: B006
 ) -> None:
-    """Mesh error of a CAD job, from two mesh sizes.
+    """Mesh error of a job, and the element size for a wanted error.
 
-    The free frequencies of the job's mesh and of a coarser one are compared.
+    The errors of the free frequencies are estimated from the stress on the mesh. For a CAD job, a coarser mesh is made
+    too, and the frequencies of both are compared.
 
     Example: cms converge part.toml
-    """
-    from cms.cli.geometry import run_converge
 
-    run_converge(job, ratio=ratio, n_modes=modes, as_json=json, changes=changes_of(set_values))
+    Example: cms converge part.toml --error 0.005 -o coarse.png
+    """
+    from cms.cli.geometry import ConvergeRequest, run_converge
+
+    run_converge(ConvergeRequest(job, ratio, modes, error, output, json), changes_of(set_values))
 
 
 @guarded

@@ -10,65 +10,171 @@ import numpy as np
 import typer
 
 from cms.cli.console import print_table, say, stages, vector_words
+from cms.cli.info import MESH_SIGNS, error_percent
 from cms.cli.outputs import output_file
 from cms.errors import JobError
 
 if TYPE_CHECKING:
+    from cms.jobs.job import Job
+    from cms.jobs.studies.mesh_convergence import MeshConvergence
+    from cms.jobs.studies.mesh_estimate import MeshEstimate
     from fe_models.files.cad.cad_faces import CadFace
     from fe_models.files.cad.cad_model import CadPart
     from fe_models.foundation.arrays import Array
+    from fe_models.foundation.stages import Stages
 
-__all__ = ["FacesRequest", "run_converge", "run_faces"]
-
-
-# `cms converge`: free frequencies of a CAD job at two mesh sizes, and the estimated mesh error ------------------------
+__all__ = ["ConvergeRequest", "FacesRequest", "run_converge", "run_faces"]
 
 
-def run_converge(path: Path, *, ratio: float, n_modes: int, as_json: bool, changes: Mapping[str, Any]) -> None:
-    """Print the frequencies for both mesh sizes, with the estimated error for the mesh size of the job.
+# `cms converge`: estimated mesh error of the free frequencies, from one mesh or from two ------------------------------
+
+
+@dataclass(frozen=True)
+class ConvergeRequest:
+    """Arguments of `cms converge`."""
+
+    path: Path
+    ratio: float
+    n_modes: int
+    error: float
+    output: Path | None
+    as_json: bool
+
+
+def run_converge(request: ConvergeRequest, changes: Mapping[str, Any]) -> None:
+    """Print the frequencies with their estimated errors, and the element size for the wanted error.
 
     Raises
     ------
     CmsError, FeModelsError
-        If the job is invalid, or its body is not from a CAD file.
+        If the job is invalid, or nothing is known about the errors.
     """
     from cms.jobs.job import read_job
-    from cms.jobs.studies.mesh_convergence import ORDER, mesh_convergence
-    from fe_models.foundation.units import unit_system
+    from cms.jobs.studies.mesh_convergence import mesh_convergence
+    from cms.jobs.studies.mesh_estimate import draw_oversize
 
-    job = read_job(path, changes)
+    if not request.error > 0:
+        raise JobError(f"converge: error: expected a number above 0, got {request.error:g}")
+    if request.output is not None:
+        output_file(request.output, request.output, (".png",), JobError, overwrite_of=(request.path,), needs_file=True)
+    job = read_job(request.path, changes)
     with stages() as clock:
-        result = mesh_convergence(job, ratio=ratio, n_modes=n_modes, stages=clock)
-    if as_json:
-        record = {
-            "job": str(path),
-            "sizes": list(result.sizes),
-            "n_dof": list(result.n_dof),
-            "ratio": result.ratio,
-            "order": ORDER,
-            "first_order": result.first_order,
-            "frequencies": result.frequencies.tolist(),
-            "estimated_error": result.error.tolist(),
-        }
+        result = None
+        if job.mesh_size is None:
+            estimate = estimate_of_job(job, request.n_modes, clock)
+        else:
+            result = mesh_convergence(job, ratio=request.ratio, n_modes=request.n_modes, stages=clock)
+            estimate = result.estimates[1]
+        if request.output is not None:
+            with clock("draw"):
+                draw_oversize(estimate, request.error, request.output)
+    record = record_of_estimate(estimate, request) | ({} if result is None else record_of_convergence(result, request))
+    if request.as_json:
         typer.echo(json.dumps(record, indent=2))
         return
-    symbol = unit_system(job.body.units).length_symbol
-    coarse, fine = (f"size {size:g} {symbol} [Hz]>" for size in result.sizes)
+    if result is None:
+        print_estimate(record)
+    else:
+        print_convergence(result, record)
+    print_proposal(record)
+    if request.output is not None:
+        say(f"wrote {request.output}")
+
+
+def estimate_of_job(job: "Job", n_modes: int, clock: "Stages") -> "MeshEstimate":
+    """Return the estimate for the one mesh of a job."""
+    from cms.jobs.body_of_job import job_body
+    from cms.jobs.studies.mesh_estimate import mesh_estimate
+
+    if n_modes < 1:
+        raise JobError(f"converge: modes: expected 1 or more, got {n_modes}")
+    body = job_body(job, clock)
+    with clock("free modes"):
+        estimate = mesh_estimate(body, n_modes)
+    if estimate.errors.of_cells is None:
+        raise JobError(
+            f"converge: the body has one mesh, whose error is {estimate.errors.method}; expected a solid, a shell, or "
+            "a CAD file with [mesh_size]"
+        )
+    return estimate
+
+
+def record_of_estimate(estimate: "MeshEstimate", request: ConvergeRequest) -> dict[str, Any]:
+    """Return the estimate from the stress on one mesh, as plain types."""
+    from cms.jobs.studies.mesh_estimate import RATE
+
+    return {
+        "job": str(request.path),
+        "frequencies": estimate.frequencies.tolist(),
+        "mesh_error": [None if np.isnan(error) else float(error) for error in estimate.errors.frequency],
+        "mesh_sign": estimate.errors.sign,
+        "mesh_method": estimate.errors.method,
+        "wanted_error": request.error,
+        "rate": RATE,
+        "size_factor": None if np.isnan(estimate.worst) else estimate.size_factor(request.error),
+    }
+
+
+def record_of_convergence(result: "MeshConvergence", request: ConvergeRequest) -> dict[str, Any]:
+    """Return the comparison of two meshes as plain types."""
+    from cms.jobs.studies.mesh_convergence import ORDER
+
+    return {
+        "sizes": list(result.sizes),
+        "n_dof": list(result.n_dof),
+        "ratio": result.ratio,
+        "order": ORDER,
+        "first_order": result.first_order,
+        "frequencies": result.frequencies.tolist(),
+        "estimated_error": result.error.tolist(),
+        "rate": result.rate,
+        "size_factor": result.size_for(request.error) / result.sizes[1],
+    }
+
+
+def print_estimate(record: dict[str, Any]) -> None:
+    """Print the frequencies of one mesh with their estimated errors."""
+    sign = MESH_SIGNS[record["mesh_sign"]]
     rows = [
-        (str(k), f"{f_1:.6g}", f"{f_2:.6g}", f"{100 * change:+.3g}", f"{100 * error:+.2g}")
-        for k, (f_1, f_2, change, error) in enumerate(
-            zip(*result.frequencies, result.change, result.error, strict=True), start=1
+        (str(k), f"{f:.6g}", error_percent(error, sign))
+        for k, (f, error) in enumerate(zip(record["frequencies"], record["mesh_error"], strict=True), start=1)
+    ]
+    print_table("Free frequencies", ("mode>", "Hz>", "mesh>"), rows)
+
+
+def print_convergence(result: "MeshConvergence", record: dict[str, Any]) -> None:
+    """Print the frequencies of two meshes, and the errors of the finer one."""
+    symbol = result.estimates[1].body.units.length_symbol
+    coarse, fine = (f"size {size:g} {symbol} [Hz]>" for size in result.sizes)
+    errors = [error_percent(error, MESH_SIGNS[record["mesh_sign"]]) for error in record["mesh_error"]]
+    rows = [
+        (str(k), f"{f_1:.6g}", f"{f_2:.6g}", f"{100 * change:+.3g}", f"{100 * error:+.2g}", of_stress)
+        for k, (f_1, f_2, change, error, of_stress) in enumerate(
+            zip(*result.frequencies, result.change, result.error, errors, strict=False), start=1
         )
     ]
-    print_table("Free frequencies", ("mode>", coarse, fine, "change [%]>", "estimated error [%]>"), rows)
+    titles = ("mode>", coarse, fine, "change [%]>", "estimated error [%]>", "from the stress>")
+    print_table("Free frequencies", titles, rows)
     say(
         f"{result.n_dof[0]} and {result.n_dof[1]} dofs; the error is that of size {result.sizes[1]:g} {symbol}, "
-        f"estimated with order {ORDER:g}: at most {100 * float(np.abs(result.error).max()):.2g} %"
+        f"estimated with order {record['order']:g}: at most {100 * float(np.abs(result.error).max()):.2g} %"
     )
     if result.first_order:
         say(f"cells of first order: no error is taken below the {100 * result.first_order:.2g} % of the mesh report")
     if (result.change < 0).any():
         say("some frequencies rise with refinement: the meshes do not yet show the same geometry; refine")
+
+
+def print_proposal(record: dict[str, Any]) -> None:
+    """Print how the errors were estimated, and the element size for the wanted error."""
+    say(f"from the stress on this mesh alone: {record['mesh_method']}")
+    if record["size_factor"] is None:
+        return
+    size = f", size {record['sizes'][1] * record['size_factor']:.3g}" if "sizes" in record else ""
+    say(
+        f"for an error of {100 * record['wanted_error']:.2g} %: elements {record['size_factor']:.2g} times as large"
+        f"{size}, if the error falls with the size to the power {record['rate']:.2g}"
+    )
 
 
 # `cms faces`: the faces of a CAD file as a list and a picture, so that interfaces can name them -----------------------

@@ -9,9 +9,11 @@
     angle. Such edges dominate for fine meshes. With p = 1, the errors of smooth modes of quadratic elements are
     overestimated by a factor of (r⁴ - 1) / (r - 1)
 (4) first-order cells can be far from convergence: no error is smaller than the one in the mesh report
+(5) beside it stands the error estimated from the stress on each mesh alone (`cms.jobs.studies.mesh_estimate`). The
+    power of the element size with which the largest of these falls gives the size for a wanted error
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,15 +22,14 @@ import numpy as np
 from cms.errors import JobError
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import Job, read_job
-from cms.modes.mode_sets.free_interface import normal_modes
-from cms.reduction.reduction import reduce
-from fe_models.body.fe_body import FEBody
+from cms.jobs.studies.mesh_estimate import MeshEstimate, mesh_estimate
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.stages import Stages
 
 __all__ = ["ORDER", "MeshConvergence", "mesh_convergence"]
 
 ORDER = 1.0  #: assumed order of convergence of the frequencies
+RATES = 1.0, 4.0  #: least and largest power of step (5)
 LEAST_RATIO = 1.05  #: smallest ratio of the sizes in the two meshes
 
 
@@ -40,6 +41,7 @@ class MeshConvergence:
     n_dof: tuple[int, int]  #: numbers of dofs of the coupled bodies
     frequencies: Array  #: frequencies with the coarse and the fine mesh, (2, n) [Hz]
     first_order: float = 0.0  #: relative error due to first-order cells, from the report of the fine mesh
+    estimates: tuple[MeshEstimate, ...] = ()  #: estimates from the stress on the coarse and on the fine mesh
 
     @property
     def ratio(self) -> float:
@@ -55,6 +57,16 @@ class MeshConvergence:
     def error(self) -> Array:
         """Estimated relative error of the fine frequencies, (n,), by steps (3) and (4); positive: too high."""
         return np.maximum(self.change / (self.ratio**ORDER - 1), self.first_order or -np.inf)
+
+    @property
+    def rate(self) -> float:
+        """Power of the element size with which the largest estimated error falls, by step (5)."""
+        coarse, fine = (each.worst for each in self.estimates)
+        return float(np.clip(np.log(coarse / fine) / np.log(self.ratio), *RATES))
+
+    def size_for(self, error: float) -> float:
+        """Return the element size for which the largest estimated error of the frequencies is `error` [length]."""
+        return self.sizes[1] * self.estimates[1].size_factor(error, self.rate)
 
 
 def mesh_convergence(
@@ -105,21 +117,14 @@ def mesh_convergence(
         body = job_body(job.model_copy(update={"mesh_size": table}), stages, on_report=reports.append)
         with stages("free modes"):
             n_dof.append(body.n_dof)
-            found.append(free_frequencies(body, n_modes))  # (2)
-    n = min(len(each) for each in found)
-    frequencies = np.array([each[:n] for each in found])
+            found.append(mesh_estimate(body, n_modes))  # (2)
+    n = min(len(each.frequencies) for each in found)
+    frequencies = np.array([each.frequencies[:n] for each in found])
     first_order = next((each.first_order.error for each in reports if each.first_order is not None), 0.0)
-    result = MeshConvergence((coarse.size, fine.size), (n_dof[0], n_dof[1]), frequencies, first_order)
+    result = MeshConvergence((coarse.size, fine.size), (n_dof[0], n_dof[1]), frequencies, first_order, tuple(found))
     if result.ratio < LEAST_RATIO:
         raise JobError(
             f"converge: the sizes {coarse.size:g} and {fine.size:g} gave nearly the same mesh ({n_dof[0]} and "
             f"{n_dof[1]} dofs): small features set the size; take a smaller size, or curvature = 0"
         )
     return result
-
-
-def free_frequencies(body: FEBody, n: int) -> Array:
-    """Return the lowest elastic frequencies of a free body, ascending, (n,) [Hz]."""
-    bare = replace(body, load_cases=())
-    reduced = reduce(bare, normal_modes(bare, n), stress=False, geometric=False)
-    return np.asarray(reduced.free_frequencies[:n] / body.units.time)

@@ -35,11 +35,11 @@ from fe_models.elements.solids.geometric import CURVED, bends_of_cells
 from fe_models.elements.solids.incompatible import KIND, VOIGT, brick_chunks, brick_operators, gradient_stress
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.threads import in_threads
-from fe_models.meshes.boundary import CORNERS, boundary_facets
+from fe_models.meshes.boundary import CORNERS, boundary_facets, facets_of
 from fe_models.meshes.cell_shapes import CELL_SHAPES
 from fe_models.meshes.mesh import Mesh
 
-__all__ = ["EnergyErrors", "energy_errors", "without_estimate"]
+__all__ = ["EnergyErrors", "energy_errors", "powers_of_size", "surface_elements", "without_estimate"]
 
 SAMPLE_BYTES = 1e8  #: size of the sampled stress that is in memory at a time [bytes]
 #: cells whose reduced integration leaves out a part of the strain energy, also if their edges are straight
@@ -109,6 +109,35 @@ def errors_of_parts(model: ElementModel, u: Array, loaded: IntArray) -> Iterator
         yield shell_errors(model, u)
     elif isinstance(model, SolidModel):
         yield solid_errors(model, u, loaded)
+
+
+def surface_elements(model: ElementModel | None) -> IntArray:
+    """Return the element of each surface triangle of a body, numbered as in `EnergyErrors`, (n_tri,); -1: none."""
+    if isinstance(model, WeldedModel):
+        parts, first = [], 0
+        for part in model.parts:
+            own = surface_elements(part)
+            parts.append(np.where(own < 0, -1, own + first))
+            first += len(powers_of_size(part))
+        return np.concatenate(parts)
+    if isinstance(model, StiffenedModel):
+        return np.concatenate([model.shell.skin.cell_of, np.full(len(model.frame.skin.triangles), -1)])
+    if isinstance(model, SolidModel):
+        return facets_of(model.mesh).cells
+    if isinstance(model, ShellModel):
+        return model.skin.cell_of
+    return np.full(len(model.skin.triangles) if isinstance(model, BeamModel) else 0, -1)
+
+
+def powers_of_size(model: ElementModel | None) -> IntArray:
+    """Return for each element the power 2 p + d of its size with which its eta² falls, p its order, d its dimension."""
+    if isinstance(model, WeldedModel):
+        return np.concatenate([powers_of_size(part) for part in model.parts])
+    if isinstance(model, SolidModel):
+        orders = [np.full(len(c), 2 if CELL_SHAPES[kind].middles else 1) for kind, c in model.mesh.cells.items()]
+        return np.asarray(2 * np.concatenate(orders) + 3)
+    shell = model.shell if isinstance(model, StiffenedModel) else model
+    return np.full(sum(len(group.cells) for group in shell.groups) if isinstance(shell, ShellModel) else 0, 2 + 2)
 
 
 # solids ---------------------------------------------------------------------------------------------------------------

@@ -59,6 +59,10 @@ def test_the_estimate_holds_the_frequencies_of_a_much_finer_mesh(job_file):
     assert (true > 0).all()  # frequencies fall with refinement, and
     assert (result.error > true).all()  # the estimate errs on the safe side,
     assert (result.error < 0.1).all()  # and says something
+    ratio = (result.estimates[1].errors.frequency / true)[true > 1e-3]
+    assert len(ratio) == 3
+    assert ((ratio > 0.5) & (ratio < 3)).all()  # so does that from the stress
+    assert result.sizes[1] < result.size_for(1.1 * result.estimates[1].worst) < 1.1 * result.sizes[1]
 
 
 def test_cells_of_first_order_have_no_less_error_than_their_report_finds(job_file):
@@ -72,7 +76,8 @@ def test_the_command_says_sizes_and_errors(job_file):
     run = run_cms("converge", path, "--modes", "3", "--json")
     record = json.loads(run.stdout)
     assert record["sizes"] == [13.5, 9.0]
-    assert len(record["estimated_error"]) == 3
+    assert len(record["estimated_error"]) == len(record["mesh_error"]) == 3
+    assert record["size_factor"] == pytest.approx((0.01 / max(record["mesh_error"])) ** (1 / record["rate"]))
     words = run_cms("converge", path, "--modes", "3").stdout
     assert "size 13.5 mm [Hz]" in words
     assert "the error is that of size 9 mm, estimated with order 1" in words
