@@ -42,19 +42,16 @@ class PatchCells:
 
 @dataclass(frozen=True, eq=False)
 class PatchRecovery:
-    """The linear map from samples to nodes, as products of small matrices."""
+    """The linear map from samples to nodes: for each term of the polynomial, its moments and their weights."""
 
-    moments: tuple[sp.csr_array, ...]  #: one per term of the polynomial: samples to patches, (n_patches, n_samples)
-    inverse: Array  #: inverse matrices of the fits, (n_patches, n_terms, n_terms)
-    terms: tuple[sp.csr_array, ...]  #: one per term: patches to nodes, (n_nodes, n_patches)
+    moments: tuple[sp.csr_array, ...]  #: samples to patches, (n_patches, n_samples)
+    weights: tuple[sp.csr_array, ...]  #: patches to nodes, (n_nodes, n_patches)
 
     def at_nodes(self, values: Array) -> Array:
         """Return the recovered values at the nodes, (n_nodes, k), of values at the samples, (n_samples, k)."""
-        moments = np.stack([each @ values for each in self.moments], axis=1)
-        coefficients = self.inverse @ moments
-        found = self.terms[0] @ np.ascontiguousarray(coefficients[:, 0])
-        for j in range(1, len(self.terms)):
-            found += self.terms[j] @ np.ascontiguousarray(coefficients[:, j])
+        found = self.weights[0] @ (self.moments[0] @ values)
+        for moment, weight in zip(self.moments[1:], self.weights[1:], strict=True):
+            found += weight @ (moment @ values)
         return np.asarray(found)
 
 
@@ -113,9 +110,9 @@ def patch_recovery(
     if order == 1:
         node, patch = with_many_samples(inside, node, patch)
     at = basis(patch, nodes[node] - center[patch]) / np.bincount(node, minlength=len(nodes))[node, None]
+    at = np.einsum("ni,nij->nj", at, np.linalg.inv(G)[patch])
     return PatchRecovery(
         tuple(sp.csr_array((np.ascontiguousarray(each), inside.indices, inside.indptr), inside.shape) for each in b.T),
-        np.asarray(np.linalg.inv(G), dtype=np.float64),
         tuple(sp.csr_array((each, (node, patch)), (len(nodes), n_patches)) for each in at.T),
     )
 
