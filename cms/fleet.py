@@ -1,12 +1,9 @@
 """A fleet of jobs: workers reduce each job to its own modal file."""
 
 import hashlib
-import logging
 import os
-import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +16,7 @@ from fe_models.foundation.paths import file_digest, file_identity, remove_parts
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.tasks.campaign import Campaign, open_task_journal
 from fe_models.foundation.tasks.installation import source_mark
+from fe_models.foundation.tasks.notes import recorded_notes
 from fe_models.foundation.tasks.workers import Workers
 from fe_models.foundation.toml_file import files_named
 
@@ -51,31 +49,6 @@ class FleetRow:
     error: str = ""  #: reason if there is no modal file; empty: success
     is_lasting: bool = True  #: whether another attempt would fail with the same error
     is_known: bool = False  #: whether the row was read from the journal
-
-
-class RecordingHandler(logging.Handler):
-    """Logging handler that collects the warnings of one thread."""
-
-    def __init__(self) -> None:
-        super().__init__(logging.WARNING)
-        self.thread = threading.get_ident()
-        self.notes: list[str] = []
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Store one warning."""
-        if record.thread == self.thread and not record.name.startswith("distributed"):
-            self.notes.append(record.getMessage())
-
-
-@contextmanager
-def recorded_notes() -> Iterator[list[str]]:
-    """Collect warnings for the row, which reports them with the name of the job, instead of printing them."""
-    root, kept = logging.getLogger(), RecordingHandler()
-    before, root.handlers = root.handlers, [kept]
-    try:
-        yield kept.notes
-    finally:
-        root.handlers = before
 
 
 class FleetTask:

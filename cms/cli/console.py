@@ -54,7 +54,7 @@ PIPE_WIDTH = 160  #: width in columns of tables that are not written to a termin
 
 def run(app: typer.Typer, name: str) -> None:
     """Run an application; text that the terminal's encoding cannot show is replaced and never causes an error."""
-    logging.getLogger().addHandler(Notes(logging.WARNING))
+    logging.getLogger().addHandler(Notes())
     for stream in (sys.stdout, sys.stderr):
         reconfigure = getattr(stream, "reconfigure", None)
         if reconfigure is not None:
@@ -78,11 +78,19 @@ def run(app: typer.Typer, name: str) -> None:
 
 
 class Notes(logging.Handler):
-    """Logging handler that prints the warnings of the packages on standard error, one line each."""
+    """Logging handler that prints the warnings of the packages on standard error, one line each, each once."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.printed: set[str] = set()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Print one warning."""
-        typer.echo(f"note: {record.getMessage()}", err=True)
+        """Print one warning, unless the same was printed, perhaps with the full path of a file."""
+        text = record.getMessage()
+        key = text.replace(f"{os.getcwd()}{os.sep}", "")
+        if key not in self.printed:
+            self.printed.add(key)
+            typer.echo(f"note: {text}", err=True)
 
 
 class PlainHelp(TyperCommand):

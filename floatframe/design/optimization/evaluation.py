@@ -10,6 +10,7 @@ from scipy.interpolate import CubicSpline
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.tasks.campaign import TaskJournal, campaign_digest, open_task_journal
+from fe_models.foundation.tasks.notes import recorded_notes
 from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.linear.frequency_response import resolved_frequencies
 from floatframe.analyses.linear.linearization import LinearSystem, linearize
@@ -118,6 +119,7 @@ class Evaluation:
     numbers: tuple[tuple[float, ...], ...] = ()  #: of each objective and constraint: one, or one per table time
     error: str = ""  #: reason why there are no numbers
     is_lasting: bool = True  #: whether another attempt would give the same error; False if the process was killed
+    notes: tuple[str, ...] = ()  #: warnings, if it was computed in this call
 
 
 @dataclass(frozen=True)
@@ -128,6 +130,12 @@ class EvaluationFunction:
 
     def __call__(self, values: tuple[float, ...]) -> Evaluation:
         """Return the numbers at these values of the parameters."""
+        with recorded_notes() as notes:
+            numbers = self.numbers(values)
+        return Evaluation(values, numbers, notes=tuple(notes))
+
+    def numbers(self, values: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
+        """Return the numbers of each objective and constraint."""
         from floatframe.files.system_file.read_system import read_system
         from floatframe.files.system_file.run_section import formulation_of
 
@@ -151,7 +159,7 @@ class EvaluationFunction:
         for q, each in zip(design.quantities, numbers, strict=True):
             if not np.isfinite(each).all():
                 raise ModelError(f"{q.output.name}: {q.output.of} is {each[int(np.argmin(np.isfinite(each)))]}")
-        return Evaluation(values, tuple(numbers))
+        return tuple(numbers)
 
     def failed(self, values: tuple[float, ...], words: str, is_lasting: bool) -> Evaluation:
         """Return a failed evaluation."""

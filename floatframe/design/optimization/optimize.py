@@ -29,7 +29,7 @@ from floatframe.design.optimization.evaluation import (
     terms,
     violations,
 )
-from floatframe.design.studies.study import check, sendable_study
+from floatframe.design.studies.study import check, report_notes, sendable_study
 from floatframe.errors import ModelError
 
 __all__ = ["Evaluated", "OptimizationResult", "optimize"]
@@ -135,6 +135,7 @@ def optimize(
         if first.evaluation.error:
             raise ModelError(f"{design.source}: the evaluation at the start failed: {first.evaluation.error}")
         is_converged, message = SOLVERS[design.method](evaluator, start)
+        report_notes(row.evaluation.notes for row in evaluator.history)
         return OptimizationResult(
             design, best_of(design, evaluator.history), tuple(evaluator.history), is_converged, message
         )

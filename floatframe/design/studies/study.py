@@ -4,8 +4,10 @@ study = read_study("crank_study.toml")
 table = run_study(study)                     # rows: parameter values, and outputs or an error
 """
 
+import logging
 import os
-from collections.abc import Callable, Iterator, Sequence
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +20,7 @@ from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.paths import file_digest
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.tasks.campaign import Campaign, campaign_digest, open_task_journal
+from fe_models.foundation.tasks.notes import recorded_notes
 from fe_models.foundation.tasks.workers import Workers
 from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.driven.inverse_dynamics import inverse_dynamics
@@ -36,7 +39,9 @@ from floatframe.results.sensors import measurement_of
 from floatframe.results.trajectory import Trajectory
 from floatframe.simulation.integrate import integrate
 
-__all__ = ["StudyRow", "StudyTable", "run_study", "sendable_study"]
+__all__ = ["StudyRow", "StudyTable", "report_notes", "run_study", "sendable_study"]
+
+log = logging.getLogger(__name__)
 
 
 # a point of a study and its result ------------------------------------------------------------------------------------
@@ -51,6 +56,7 @@ class StudyRow:
     units: tuple[str, ...]
     error: str = ""  #: reason of a failure
     is_lasting: bool = True  #: whether a repeated attempt would give the same result; False for a killed process
+    notes: tuple[str, ...] = ()  #: warnings of the point, if it was computed in this call
 
 
 # study ----------------------------------------------------------------------------------------------------------------
@@ -172,7 +178,18 @@ def run_study(
         points, study.workers if workers is None else workers, progress=progress,
         files=[os.path.abspath(name) for name in files],
     )  # fmt: skip
+    report_notes(row.notes for row in rows)
     return StudyTable(study, tuple(rows), campaign.n_known)
+
+
+def report_notes(notes: Iterable[Sequence[str]]) -> None:
+    """Log, of the notes of all points, the first of those that differ only in their numbers, and how many they are."""
+    found: dict[str, list[str]] = {}
+    for of_point in notes:
+        for kind, note in {re.sub(r"\d[\d.e+-]*", "#", note): note for note in reversed(of_point)}.items():
+            found.setdefault(kind, []).append(note)
+    for same in found.values():
+        log.warning("%s%s", same[0], f" (and at {len(same) - 1} more points)" if len(same) > 1 else "")
 
 
 def sendable_study(study: Study) -> Study:
@@ -232,14 +249,15 @@ class StudyPoint:
         """Return the row of a point."""
         from floatframe.files.system_file.read_system import read_system
 
-        system, given = read_system(self.study.system, self.study.changes(point))
-        if self.study.analysis == "modes":
-            modes = system_modes(linearize(system, formulation=formulation_of(given)))
-            found = [output_value_of_modes(output, modes, 1 / system.units.time) for output in self.study.outputs]
-        else:
-            motion = self.motion(system, given)
-            found = [output_value(output, system, motion) for output in self.study.outputs]
-        return StudyRow(point, tuple(value for value, _ in found), tuple(unit for _, unit in found))
+        with recorded_notes() as notes:
+            system, given = read_system(self.study.system, self.study.changes(point))
+            if self.study.analysis == "modes":
+                modes = system_modes(linearize(system, formulation=formulation_of(given)))
+                found = [output_value_of_modes(output, modes, 1 / system.units.time) for output in self.study.outputs]
+            else:
+                motion = self.motion(system, given)
+                found = [output_value(output, system, motion) for output in self.study.outputs]
+        return StudyRow(point, tuple(value for value, _ in found), tuple(unit for _, unit in found), notes=tuple(notes))
 
     def failed(self, point: tuple[Any, ...], words: str, is_lasting: bool) -> StudyRow:
         """Return the row of a failed point."""

@@ -1,4 +1,5 @@
 import json
+import logging
 import os
 import re
 import signal
@@ -14,6 +15,7 @@ from typer.testing import CliRunner
 
 from cms.body.modal_file.file import write
 from cms.cli.app import app as cms_app
+from cms.cli.console import Notes
 from floatframe.cli.app import app
 from floatframe.pictures.animation import bodies_of
 from floatframe.results.energy_balance import balance_defect, energy_scale
@@ -386,3 +388,10 @@ def test_resume_asks_for_the_system_file_where_it_gets_the_results(results):
     assert result.exit_code == 2
     assert "expected the system file (TOML) of the run, got its results" in " ".join(result.output.split())
     assert "resume swing.toml -o" in " ".join(result.output.split())
+
+
+def test_a_note_is_printed_once_also_with_the_full_path_of_its_file(capsys):
+    notes = Notes()
+    for text in ("a.toml: unused", f"{os.getcwd()}/a.toml: unused", "b.toml: unused"):
+        notes.handle(logging.makeLogRecord({"msg": text, "levelno": logging.WARNING}))
+    assert capsys.readouterr().err.splitlines() == ["note: a.toml: unused", "note: b.toml: unused"]

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import logging
 import socket
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from numpy.testing import assert_allclose
 
 from fe_models.foundation.toml_file import FileContent, changed
 from floatframe import GeneralizedAlpha, integrate
-from floatframe.design.studies.study import run_study
+from floatframe.design.studies.study import StudyPoint, run_study
 from floatframe.design.studies.study_file import read_study
 from floatframe.errors import SystemFileError
 from floatframe.files.system_file.read_system import read_system
@@ -161,6 +162,21 @@ take = "mean"
     motion = integrate(system, GeneralizedAlpha(), 1.0, 2e-2)
     assert float(third[2]) == measured(system, motion)["tip"].columns["size"].max()
     assert_allclose(float(first[4]), float(first[3]), rtol=0.05)  # the mean rate over one second
+
+
+def test_a_note_of_many_points_is_told_once(folder, monkeypatch, caplog):
+    """The notes of the six points differ in a number."""
+
+    def noted(self, system, given):
+        logging.getLogger("floatframe").warning("mass %g is large", system.bodies[0].mass)
+        return plain(self, system, given)
+
+    plain = StudyPoint.motion
+    monkeypatch.setattr(StudyPoint, "motion", noted)
+    (folder / "study.toml").write_text(STUDY.replace('"modes"', '"static"').replace('"frequency 1"', '"hinge.angle"'))
+    table = run_study(read_study(folder / "study.toml"), workers=1)
+    assert [row.notes for row in table.rows][:2] == [("mass 1 is large",), ("mass 2 is large",)]
+    assert [text for text in caplog.messages if "large" in text] == ["mass 1 is large (and at 5 more points)"]
 
 
 def test_what_nobody_foresaw_is_a_row_too(folder, monkeypatch):
