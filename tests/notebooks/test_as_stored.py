@@ -13,12 +13,13 @@ from tests.root import ROOT
 
 NAMES = sorted(path.stem for path in NOTEBOOKS.glob("*.ipynb"))
 PACKAGES = ("fe_models", "cms", "floatframe")
-#: names that notebooks import and that no namespace offers
+#: rooms from which pages of the documentation import
+ROOMS = ("floatframe.machines.", "floatframe.files.signals.")
+#: other names that notebooks import and that no namespace offers
 NOT_PUBLIC = {
     "controlled_arm": {"floatframe.model.bodies.mode_choice.with_modes"},
     "deployable_antenna": {"floatframe.engine.compiling.system.compiled_system"},
     "from_your_fe_program_to_a_motion": {"cms.jobs.body_of_job.job_body", "cms.jobs.job.read_job"},
-    "motor_bogie": {"floatframe.files.signals.orders.frequency_map", "floatframe.files.signals.signals.Signal"},
     "railway_engine": {"floatframe.design.laboratory.body_figures.error_figure"},
     "spacecraft_tower": {
         "cms.jobs.body_of_job.job_body", "cms.jobs.job.read_job", "floatframe.model.bodies.mode_choice.with_modes",
@@ -26,8 +27,6 @@ NOT_PUBLIC = {
     },
     "suspension_arm": {
         "cms.jobs.body_of_job.job_body", "cms.jobs.job.read_job", "floatframe.model.rotations.rotation_matrix",
-        *(f"floatframe.files.signals.{name}"
-          for name in ("Signals", "psd", "read_signals", "transfer_estimate", "write_rpc")),
     },
 }  # fmt: skip
 CELL = "for k in range(3):\n    square = k * k\n    print(square)"
@@ -50,7 +49,7 @@ def test_a_notebook_says_what_it_teaches_what_it_needs_and_what_comes_next(name)
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_notebook_imports_public_names_and_those_of_machines(name):
+def test_a_notebook_imports_public_names_and_those_of_documented_rooms(name):
     public = {f"{module}.{each}" for package in PACKAGES for module in namespaces(package) for each in names_of(module)}
     imported = {
         f"{statement.module}.{each.name}"
@@ -60,7 +59,7 @@ def test_a_notebook_imports_public_names_and_those_of_machines(name):
         if isinstance(statement, ast.ImportFrom) and statement.module.split(".")[0] in PACKAGES
         for each in statement.names
     }
-    below = {each for each in imported - public if not each.startswith("floatframe.machines.")}
+    below = {each for each in imported - public if not each.startswith(ROOMS)}
     assert below == NOT_PUBLIC.get(name, set())
 
 
