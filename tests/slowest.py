@@ -15,7 +15,7 @@ SLOWEST = tuple(
     f"tests/{name}.py"
     for name in (
         "floatframe/engine/structure_preserving/test_every_element", "docs/test_getting_started",
-        "docs/test_tutorials", "docs/test_other_programs",
+        "docs/test_tutorials", "docs/test_neighbouring_programs",
         "cms/cli/test_commands", "pipeline/test_split_line", "floatframe/engine/structure_preserving/test_every_part",
         "floatframe/test_own_kinds", "floatframe/laws/test_every_constant",
         "floatframe/engine/kernels/compiler/test_interpreted",

@@ -4,7 +4,7 @@ import pytest
 
 from tests.docs.tutorials import blocks, walk_of
 
-PAGES = ("exudyn", "mbdyn", "openfast", "simulink")
+PAGES = ("abaqus", "cad", "co_simulation", "exudyn", "matlab", "mbdyn", "openfast", "simulink")
 
 
 @pytest.mark.parametrize("page", PAGES)
