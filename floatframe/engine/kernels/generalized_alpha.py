@@ -445,15 +445,34 @@ def correction_of_states(model, work, c_k):
 
 
 @inner
-def roundoff_floor(model, work, length):
-    """Return the squared norm of roundoff errors of positions."""
+def total_mass(model):
+    """Return the mass of all bodies."""
+    mass = 0.0
+    for i in range(model.bodies.kind.shape[0]):
+        mass += model.body_types.mass[model.bodies.kind[i]]
+    return mass
+
+
+@inner
+def wanted_correction(model, order, c_k, size, size_x):
+    """Return the norm of the last correction that the tolerance asks for.
+
+    size, size_x: squared norms of the accelerations without gravity and of the displacement in a step.
+    """
+    size += total_mass(model) * dot(model.gravity, model.gravity)
+    return order.tolerance * (c_k * math.sqrt(size) + OF_MOTION * math.sqrt(size_x))
+
+
+@inner
+def roundoff_floor(model, r, length):
+    """Return the norm of roundoff errors of the positions r of the bodies."""
     total = 0.0
     for i in range(model.bodies.kind.shape[0]):
         size = length
         for k in range(3):
-            size += abs(work.state.r[i, k])
+            size += abs(r[i, k])
         total += model.body_types.mass[model.bodies.kind[i]] * size * size
-    return total * ROUNDOFF * ROUNDOFF
+    return math.sqrt(total * ROUNDOFF * ROUNDOFF)
 
 
 @inner
@@ -509,12 +528,8 @@ def one_step(model, work, memory, order, h):
     c_d = gamma * h
     c_m = (1 - alpha_m) / (1 - alpha_f)
     size, size_x = predict(model, work, memory, h, order)
-    mass = 0.0
-    for i in range(model.bodies.kind.shape[0]):
-        mass += model.body_types.mass[model.bodies.kind[i]]
-    size += mass * dot(model.gravity, model.gravity)
-    wanted = order.tolerance * (c_k * math.sqrt(size) + OF_MOTION * math.sqrt(size_x))
-    allowed = wanted + math.sqrt(roundoff_floor(model, work, order.length))
+    wanted = wanted_correction(model, order, c_k, size, size_x)
+    allowed = wanted + roundoff_floor(model, work.state.r, order.length)
     solver = work.solver
     if solver.c_m != c_m or solver.c_d != c_d or solver.c_k != c_k:
         work.solver.is_due, work.solver.has_late_gaps = 1, 0
@@ -523,6 +538,7 @@ def one_step(model, work, memory, order, h):
     last, last_of_states = math.inf, math.inf
     excess = math.inf
     holds = order.stabilized != 0 and solver.mu.shape[0] > 0
+    mass = total_mass(model)
     least_gap = SAFE * wanted / math.sqrt(mass) if mass > 0.0 else 0.0  # all bodies are within the limit
     is_new, is_aged, first_of_rates = True, False, 0.0
     has_states = model.states.row.shape[0] + model.laws.equation.shape[0] > 0

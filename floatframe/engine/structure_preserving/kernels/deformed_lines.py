@@ -66,6 +66,7 @@ from floatframe.engine.structure_preserving.kernels.markers import (
     deformation,
     mean_jacobian,
     put_end_of_forces,
+    put_start,
 )
 from floatframe.engine.structure_preserving.kernels.rows import add_product, held, mean_direction
 from floatframe.model.joints.rows.kinds import LINE_TURN
@@ -128,11 +129,7 @@ def begin_lines(model, step):
         sigma, angle, tangent = on_line(model, step, k, BEGIN, s, s_c)
         step.line_s[k, BEGIN] = s
         arm, E = turned(R, sigma), product(exp_matrix(angle), matrix(model.markers.triad[m]))
-        put(step.arm_0[m], 0, arm)
-        put(step.th_0[m], 0, angle)
-        put_matrix(step.E_0[m], E)
-        put(step.x_0[m], 0, add(vector(step.c_0[i]), arm))
-        put_matrix(step.A_0[m], product(R, E))
+        put_start(step, m, i, arm, angle, E)
         put(step.line_end[k], 0, turned(R, tangent))
 
 

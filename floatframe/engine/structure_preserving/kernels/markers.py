@@ -47,7 +47,8 @@ from floatframe.engine.kernels.vector import (
 )
 
 __all__ = ["add_direction", "add_force", "add_moment", "add_pair", "begin_markers", "begin_unit_load", "change",
-           "end_unit_load", "ends", "marker_loads", "marker_step", "put_end_of_forces", "turning"]  # fmt: skip
+           "end_unit_load", "ends", "marker_loads", "marker_step", "put_end_of_forces", "put_start",
+           "turning"]  # fmt: skip
 
 SMALL = 1e-14  # square of an elastic rotation in a step below which its Cayley vector is T dth to roundoff
 NONE = (0.0, 0.0, 0.0)
@@ -90,12 +91,18 @@ def begin_markers(model, discrete, step):
         arm, E = turned(R, sigma), matrix(model.markers.triad[m])
         if discrete.turns[m]:
             E = product(exp_matrix(th), E)
-        put(step.arm_0[m], 0, arm)
-        put(step.th_0[m], 0, th)
-        put_matrix(step.E_0[m], E)
-        put(step.x_0[m], 0, add(vector(step.c_0[i]), arm))
-        put_matrix(step.A_0[m], product(R, E))
+        put_start(step, m, i, arm, th, E)
         put(step.dpsi[m], 0, NONE)
+
+
+@inner
+def put_start(step, m, i, arm, th, E):
+    """Write marker m of body i at the start of the step; arm: from the centre of mass, th: elastic rotation vector."""
+    put(step.arm_0[m], 0, arm)
+    put(step.th_0[m], 0, th)
+    put_matrix(step.E_0[m], E)
+    put(step.x_0[m], 0, add(vector(step.c_0[i]), arm))
+    put_matrix(step.A_0[m], product(step.R_0[i], E))
 
 
 @loops

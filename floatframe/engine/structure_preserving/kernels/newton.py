@@ -9,7 +9,7 @@ Derivatives are differences of residuals. One evaluation serves for several unkn
 import math
 
 from floatframe.engine.kernels.compiler.compilation import inner, matrix_loops
-from floatframe.engine.kernels.generalized_alpha import DIVERGED, DONE, SINGULAR
+from floatframe.engine.kernels.generalized_alpha import DIVERGED, DONE, SINGULAR, roundoff_floor, total_mass
 from floatframe.engine.kernels.model import BUSHING, CONTACT, ELEMENT, JOINT, SPRING, USER_FORCE
 from floatframe.engine.kernels.vector import copy, cross, matrix, norm, put_sum, scaled, sub, turned_back, vector
 from floatframe.engine.structure_preserving.kernels.bodies import body_inertia, body_step
@@ -106,7 +106,6 @@ SLOW = 0.25  # ratio of successive corrections above which the derivatives are r
 MANY = 7  # number of iterations of a step after which the next one starts with new factors
 # allowed estimate of the next correction, relative to the allowed correction
 LEFT = 1e-2
-ROUNDOFF = 2e-15  # relative roundoff of a position
 
 
 @inner
@@ -307,15 +306,8 @@ def size_of(discrete, step):
 @inner
 def smallest(model, step, order):
     """Return the allowed size of a correction: tolerance times the displacement in a step, plus roundoff."""
-    floor, mass = 0.0, 0.0
-    for i in range(model.bodies.kind.shape[0]):
-        m, size = model.body_types.mass[model.bodies.kind[i]], order.length
-        for k in range(3):
-            size += abs(step.c_0[i, k])
-        floor += m * size * size
-        mass += m
-    fall = 0.5 * step.h * step.h * norm(vector(model.gravity)) * math.sqrt(mass)
-    return order.tolerance * fall + ROUNDOFF * math.sqrt(floor)
+    fall = 0.5 * step.h * step.h * norm(vector(model.gravity)) * math.sqrt(total_mass(model))
+    return order.tolerance * fall + roundoff_floor(model, step.c_0, order.length)
 
 
 @inner

@@ -94,9 +94,16 @@ def begin_spin(tree, joints, memory, i, alpha_f, h):
     a = sub(of_body(tree, i, Q, memory.a[tree.slot[tree.unknown[k]] :]), turn)
     rest = scaled(1.0 / (1.0 - alpha_f), sub(a, scaled(alpha_f, sub(alpha, turn))))
     theta = scaled(h, add(omega, scaled(0.5 * h, a)))
+    omega, alpha = after_spin(e, dot(e, theta), add(omega, scaled(h, a)), rest)
+    put_spin(tree, joints, i, theta, omega, alpha)
+
+
+@inner
+def put_spin(tree, joints, i, theta, omega, alpha):
+    """Write increments of a spinning body, its rotation, and its motion relative to the parent as rates of columns."""
+    k = first_rotation(tree, i)
     put(joints.x, k, theta)
     turn_spinning_joint(tree, joints, i)
-    omega, alpha = after_spin(e, dot(e, theta), add(omega, scaled(h, a)), rest)
     put(joints.rate, k, of_columns(tree, i, joints.Q[i], omega))
     put(joints.acceleration, k, of_columns(tree, i, joints.Q[i], alpha))
 
@@ -116,10 +123,7 @@ def change_spin(tree, joints, step, i, by_theta, by_rate, by_acceleration):
         scaled(by_rate, y),
         scaled(by_acceleration, y),
     )
-    put(joints.x, k, theta)
-    turn_spinning_joint(tree, joints, i)
-    put(joints.rate, k, of_columns(tree, i, joints.Q[i], omega))
-    put(joints.acceleration, k, of_columns(tree, i, joints.Q[i], alpha))
+    put_spin(tree, joints, i, theta, omega, alpha)
 
 
 @inner

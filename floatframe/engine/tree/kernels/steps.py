@@ -17,7 +17,6 @@ from floatframe.engine.kernels.generalized_alpha import (
     DONE,
     INACCURATE,
     MOST_TURN,
-    OF_MOTION,
     OFF_AXIS,
     SINGULAR,
     SLOW,
@@ -37,6 +36,7 @@ from floatframe.engine.kernels.generalized_alpha import (
     roundoff_floor,
     settle_row,
     time_loop,
+    wanted_correction,
     write_row,
 )
 from floatframe.engine.kernels.model import STIFFNESS
@@ -391,9 +391,9 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
             of_rates = hold_velocities(model, work, tree, joints, tangent, c_d / c_k, c_m / c_k, c_k)
         correct(model, work, tree, joints, tangent, c_k)
         if iteration == 0:
-            size, size_x = sizes_of_step(model, work, memory, h)
-            wanted = order.tolerance * (c_k * math.sqrt(size) + OF_MOTION * math.sqrt(size_x))
-            allowed = wanted + math.sqrt(roundoff_floor(model, work, order.length))
+            size, size_x = sizes_of_step(work, memory, h)
+            wanted = wanted_correction(model, order, c_k, size, size_x)
+            allowed = wanted + roundoff_floor(model, work.state.r, order.length)
         norm = math.sqrt(of_rates + update(model, work, tree, joints, tangent, c_d / c_k, c_m / c_k, c_k))
         memory.n_iterations += 1
         if is_old and work.counted.factorisations > factorisations:
