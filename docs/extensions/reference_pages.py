@@ -81,7 +81,7 @@ def keys_page(kind: str) -> str:
     """Return the page of the keys of a kind of file, a section for each of its tables."""
     schema = json.loads(schema_text(kind))
     lines = [
-        f"# Keys of a {kind} file", "",
+        f"# Keys of {'an' if kind == 'optimization' else 'a'} {kind} file", "",
         f"`kind = \"{kind}\"`; `{KINDS[kind].command} FILE` runs it, and `floatframe schema {kind}` prints its schema. "
         "A key without a default is required where its table is given, unless its meaning says otherwise.", "",
         "## The file", "", *keys_table(schema), "",
