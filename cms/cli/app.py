@@ -8,6 +8,7 @@ import typer
 from cms.cli.arguments import ModalFile, Output, SetValues, Workers, changes_of
 from cms.cli.console import commands, guarded, register, say
 from cms.cli.demo import demo_command
+from cms.cli.family import family_command, interpolate_command
 from cms.cli.info import info_command, print_body
 from cms.cli.modes import view_command
 from cms.cli.reduce import Fleet, reduce_and_write_fleet, reduce_command
@@ -573,7 +574,14 @@ register(
             "split": split_command,
             "schema": schema_command_of("cms"),
         },
-        "Reduce": {"run": run_command, "reduce": reduce_command, "modes": modes_command, "frame": frame_command},
+        "Reduce": {
+            "run": run_command,
+            "reduce": reduce_command,
+            "modes": modes_command,
+            "frame": frame_command,
+            "family": family_command,
+            "interpolate": interpolate_command,
+        },
         "Judge": {
             "check": check_command,
             "accept": accept_command,

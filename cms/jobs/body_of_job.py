@@ -4,6 +4,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from cms.errors import JobError
 from cms.jobs.job import Job
 from fe_models.assembly.assemble import assemble
@@ -114,6 +116,8 @@ def mesh_of_job(job: Job) -> "AnyMesh":
         chosen += [table.faces for table in job.load_cases.values()]
         faces = [text for texts in chosen for text in texts or ()]
         mesh = mesh_cad(job.body.mesh, size, units=job.body.units, faces=faces)
+    if job.body.scale is not None:
+        mesh = replace(mesh, nodes=mesh.nodes * np.array(job.body.scale))
     if job.body.part is None:
         return mesh
     from fe_models.meshes.split import split_mesh

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from cms.errors import JobError
 from cms.jobs.reduction_table import DampingSection, ReductionSection, mode_set_options, named_interfaces
@@ -87,10 +87,18 @@ def elements_named(value: Any) -> tuple[Any, ...]:
     return tuple(entries)
 
 
+def factors(value: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Return three factors above 0."""
+    if min(value) <= 0:
+        raise ValueError("expected three factors above 0, [x, y, z]")
+    return value
+
+
 beside_the_job = existing_file()
 FileOfTheJob = Annotated[Path, BeforeValidator(beside_the_job)]
 Keep = Annotated[tuple[Any, ...], BeforeValidator(nodes_to_keep, json_schema_input_type=Any)]
 StressPoints = Annotated[tuple[Any, ...], BeforeValidator(elements_named, json_schema_input_type=Any)]
+Scale = Annotated[Vector3, AfterValidator(factors)]
 Accepted = Annotated[tuple[str, ...], BeforeValidator(accepted, json_schema_input_type=Any)]
 
 
@@ -153,6 +161,9 @@ class BodySection(Table):
         None,
         description="for a deck (.inp): calculix (default) or abaqus, which determines the elements with lumped mass",
     )
+    scale: Scale | None = Field(
+        None, description="three numbers above 0: factors of the node coordinates of a mesh or of tables of nodes"
+    )
     part: PartSection | None = Field(None, description="a table {number, of or at, axis}: one part of the mesh alone")
     units: choice("unit system", lambda: tuple(UNIT_SYSTEMS)) = Field(  # type: ignore[valid-type]
         description=f"the unit system of the numbers, one of {', '.join(UNIT_SYSTEMS)}"
@@ -204,6 +215,8 @@ class BodySection(Table):
                 raise ValueError(f"{key}: belongs to matrices of other programs, not to .npz with nodes and dofs")
         if self.part is not None and self.matrices is not None:
             raise ValueError("part: matrices cannot be cut; remove it, or give the mesh")
+        if self.scale is not None and (self.matrices or self.deck):
+            raise ValueError("scale: belongs to a mesh, or to tables of nodes and lines; remove it")
         given = [key for key in ("mesh", "deck", "matrices", "lines") if getattr(self, key) is not None]
         if len(given) != 1:
             got = "both" if given == ["mesh", "matrices"] else " and ".join(given) or "neither"
@@ -316,6 +329,8 @@ class Job(ModelTables):
             raise ValueError("body.incompatible_modes: belongs to a mesh of solid cells; remove it")
         if self.body.plane and (self.ties or not self.sections):
             raise ValueError("body.plane: belongs to beams alone; remove it")
+        if self.body.scale and self.ties:
+            raise ValueError("body.scale: beams tied to a solid are in another mesh; remove it")
         if self.body.part and self.ties:
             raise ValueError("body.part: beams tied to a solid cannot be cut; remove it, or cut one without the other")
         if self.body.lines and self.ties:

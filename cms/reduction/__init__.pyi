@@ -1,4 +1,5 @@
 from cms.fleet import reduce_fleet as reduce_fleet
+from cms.jobs.studies.family_of_job import reduce_family as reduce_family
 
 from .assumed_mode_beams.assumed_beam import beam_from_assumed_modes as beam_from_assumed_modes
 from .basis.damping import ModalDamping as ModalDamping
@@ -8,6 +9,10 @@ from .basis.damping import RayleighDamping as RayleighDamping
 from .basis.frames import BuckensFrame as BuckensFrame
 from .frame_conversion import convert_frame as convert_frame
 from .geometric_stiffness.unit_states import unit_states as unit_states
+from .parametric.family_file import read_parametric_body as read_parametric_body
+from .parametric.family_file import write_parametric_body as write_parametric_body
+from .parametric.parametric_body import ParametricBody as ParametricBody
+from .parametric.parametric_body import parametric_body as parametric_body
 from .recovery.files import CraigBampton as CraigBampton
 from .recovery.files import craig_bampton_matrices as craig_bampton_matrices
 from .recovery.matrices import recovery_matrices as recovery_matrices

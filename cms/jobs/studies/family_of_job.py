@@ -1,0 +1,83 @@
+"""A parametric body from a job: the job is reduced at every point of a grid of its parameters."""
+
+import os
+from collections.abc import Mapping, Sequence
+from itertools import product
+from pathlib import Path
+
+from cms.errors import JobError
+from cms.jobs.job import Job, read_job
+from cms.pipeline import reduce_job
+from cms.reduction.parametric.parametric_body import (
+    MOST_PARAMETERS,
+    MOST_VALUES,
+    ParametricBody,
+    middle_point,
+    parametric_body,
+    point_name,
+)
+from fe_models.foundation.solver import Solver
+from fe_models.foundation.stages import Stages
+
+__all__ = ["reduce_family"]
+
+
+def reduce_family(
+    path: Path | str,
+    over: Mapping[str, Sequence[float]],
+    *,
+    solver: str | Solver | None = None,
+    stages: Stages | None = None,
+) -> ParametricBody:
+    """Reduce a job at every combination of values of its parameters, and estimate the error of interpolation.
+
+    A job with a parameter of two values only is reduced once more, in the middle, for the estimate.
+
+    Parameters
+    ----------
+    path
+        Job file.
+    over
+        Ascending values of one to three parameters of the job, or of numbers by key path.
+    solver
+        As in `cms.reduce_job`.
+    stages
+        Receives the time of each reduction.
+
+    Raises
+    ------
+    JobError
+        If the job has no such parameter, or the values do not ascend.
+    BodyError
+        If the samples have different modes, interfaces or meshes, or their modes cannot be aligned.
+
+    Examples
+    --------
+    >>> family = cms.reduction.reduce_family("rod.toml", {"length": [1.0, 1.2]})          # doctest: +SKIP
+    >>> cms.write(family.at(length=1.1), "rod_1100.h5")                                   # doctest: +SKIP
+    """
+    path, stages = Path(path), stages or Stages()
+    if not 1 <= len(over) <= MOST_PARAMETERS:
+        raise JobError(f"{path}: expected one to {MOST_PARAMETERS} parameters to vary, got {len(over)}")
+    for name, values in over.items():
+        if not 2 <= len(values) <= MOST_VALUES or list(values) != sorted(set(values)):
+            raise JobError(
+                f"{path}: {name}: expected two to {MOST_VALUES} ascending values, got "
+                f"{', '.join(f'{x:g}' for x in values)}"
+            )
+    points = [dict(zip(over, point, strict=True)) for point in product(*over.values())]
+    if any(len(values) == 2 for values in over.values()):
+        points.append(middle_point(over))
+    jobs = [job_at(path, point) for point in points]  # wrong names and values are refused before the first reduction
+    samples = []
+    for point, job in zip(points, jobs, strict=True):
+        with stages(point_name(point)):
+            samples.append(reduce_job(job, solver=solver))
+    n = len(points) - any(len(values) == 2 for values in over.values())
+    with stages("align and judge"):
+        return parametric_body(over, samples[:n], middle=samples[n] if n < len(samples) else None)
+
+
+def job_at(path: str | os.PathLike[str], point: Mapping[str, float]) -> Job:
+    """Return the job with these values of its parameters."""
+    return read_job(path, {name: int(x) if float(x).is_integer() else float(x) for name, x in point.items()})

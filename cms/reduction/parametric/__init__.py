@@ -1,0 +1,1 @@
+"""Reduced bodies as functions of design parameters, interpolated between samples."""

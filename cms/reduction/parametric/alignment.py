@@ -1,0 +1,136 @@
+"""Modes of several samples of a body in the same modal coordinates, so that their matrices can be interpolated.
+
+Modes of different samples have arbitrary signs, change places where their frequencies cross, and mix where these are
+close. They are aligned with the modes of a reference sample [1]_:
+
+(1) rows of the shapes: translations of the kept nodes, their rotations where known, and motion of the interfaces;
+    rotations times the size of the body
+(2) orthonormal columns: X = U (XᵀX)^(1/2). The shapes are orthonormal in the mass of the body, which is not
+    known at the kept nodes; this restores it
+(3) Q = argmin |U Q - U_reference| over orthogonal Q, from the singular value decomposition of Uᵀ U_reference
+    (Procrustes). The singular values are the cosines of the angles between the two spaces of shapes
+(4) Phi Q, congruence transformation of all matrices. Then the coordinates are scaled to the mass m of the body: shapes
+    have no unit, and M = m 1
+(5) in moments and rotations of the shapes, lengths along each axis are divided by the radius of gyration
+    g_a = sqrt(R_aa / m): of bodies of different length nothing but the radii is then different
+
+References
+----------
+.. [1] Panzer et al. (2010) and Amsallem & Farhat (2011), docs/bibliography.md.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cms.body.reduced_body import ReducedBody
+from cms.errors import BodyError
+from cms.reduction.frame_conversion import Change, changed_body
+from fe_models.foundation.arrays import Array
+
+__all__ = ["AlignedSample", "align", "divisors", "recombined", "rescaled"]
+
+FLAT = 1e-6  #: radius of gyration along an axis, relative to the largest, below which the body has no extension
+
+VISIBLE = 1e-7  #: smallest singular value of the rows of all modes, relative to the largest, that alignment needs
+LEAST_COSINE = 0.5  #: smallest cosine of the angles between the spaces of two samples, beyond which they do not match
+
+
+@dataclass(frozen=True, eq=False)
+class AlignedSample:
+    """A sample in the modal coordinates of the reference, scaled to the mass of the body."""
+
+    body: ReducedBody  #: after steps (4) and (5): M = m 1, K = m times `omega2`
+    radii: Array  #: g_a about the origin of the frame, zero for a body in a plane or on a line, (3,) [m]
+    omega2: Array  #: Qᵀ diag(omega²) Q, (n_q, n_q) [1/s²]
+
+    @property
+    def log_stiffness(self) -> Array:
+        """Matrix logarithm of `omega2`, (n_q, n_q)."""
+        values, vectors = np.linalg.eigh(self.omega2)
+        return np.asarray(vectors * np.log(values) @ vectors.T)
+
+
+def align(sample: ReducedBody, reference: ReducedBody, name: str, reference_name: str) -> AlignedSample:
+    """Return a sample with its modes aligned with those of the reference.
+
+    Parameters
+    ----------
+    name, reference_name
+        What messages call the two, such as "length = 1.2".
+
+    Raises
+    ------
+    BodyError
+        If modes cannot be distinguished at the kept nodes, or the shapes of both samples span different spaces.
+    """
+    U, V = orthonormal_rows(name, sample), orthonormal_rows(reference_name, reference)
+    left, cosines, right = np.linalg.svd(U.T @ V)  # (3)
+    if cosines[-1] < LEAST_COSINE:
+        k = int(np.argmax(np.abs(left[:, -1])))
+        raise BodyError(
+            f"parametric body: {name}: {np.count_nonzero(cosines < LEAST_COSINE)} of {sample.n_q} modes have no "
+            f"counterpart in {reference_name}, first of all mode {k + 1}, {sample.labels[k]!r} (cosine "
+            f"{cosines[-1]:.2f}); expected the same modes in all samples. Take another n_modes, so that the highest "
+            "modes do not change places with those left out, or samples at smaller distances"
+        )
+    Q = left @ right
+    scaled = recombined(sample, Q * np.sqrt(sample.moments.m))  # (4)
+    radii = np.sqrt(np.maximum(np.diag(sample.moments.R), 0.0) / sample.moments.m)
+    radii[radii < FLAT * radii.max()] = 0.0
+    return AlignedSample(
+        rescaled(scaled, divisors(radii), float(np.linalg.norm(radii))), radii, Q.T @ (np.diag(sample.K)[:, None] * Q)
+    )
+
+
+def orthonormal_rows(name: str, body: ReducedBody) -> Array:
+    """Return U of steps (1) and (2), (n_rows, n_q)."""
+    points = np.concatenate([body.nodes, *(interface.position[None] for interface in body.interfaces)])
+    size = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
+    scale = np.array([1.0, 1, 1, size, size, size])[:, None]
+    rotations = [] if body.kept is None else [size * body.kept.rotation.reshape(-1, body.n_q)]
+    of_interfaces = [scale * interface.Psi for interface in body.interfaces]
+    X = np.vstack([body.Phi.reshape(-1, body.n_q), *rotations, *of_interfaces])
+    left, sizes, right = np.linalg.svd(X, full_matrices=False)
+    if len(sizes) < body.n_q or sizes[-1] <= VISIBLE * sizes[0]:
+        n = int(np.count_nonzero(sizes > VISIBLE * sizes.max(initial=0.0)))
+        raise BodyError(
+            f"parametric body: {name}: its kept nodes and interfaces distinguish only {n} of {body.n_q} modes; keep "
+            "more nodes (keep in the table [body] of the job), or take fewer modes"
+        )
+    return np.asarray(left @ right)
+
+
+def recombined(body: ReducedBody, Z: Array) -> ReducedBody:
+    """Return the body over the shapes Phi Z, (n_q, n_q), which need not diagonalise K."""
+    change = Change(np.zeros((6, body.n_q)), Z, np.zeros(3), np.eye(3))
+    changed = changed_body(replace(body, geometric=None), body.frame, change, np.ones(body.n_q), None)
+    return replace(
+        changed,
+        M=Z.T @ body.M @ Z,
+        K=Z.T @ body.K @ Z,
+        geometric=None if body.geometric is None else body.geometric.transformed(Z),
+        provenance=body.provenance,
+    )
+
+
+def divisors(radii: Array) -> Array:
+    """Return the lengths of step (5) along the axes, (3,): radii of gyration, 1 without extension."""
+    return np.where(radii > 0, radii, 1.0)
+
+
+def rescaled(body: ReducedBody, lengths: Array, length: float) -> ReducedBody:
+    """Return the body with positions in its moments divided by lengths, (3,), and rotations times a length."""
+    moments, kept = body.moments, body.kept
+    turns = np.array([1.0, 1, 1, length, length, length])[:, None]
+    return replace(
+        body,
+        moments=replace(
+            moments,
+            S=moments.S / lengths,
+            R=moments.R / np.outer(lengths, lengths),
+            P=moments.P / lengths[:, None, None],
+        ),
+        interfaces=tuple(replace(each, Psi=turns * each.Psi) for each in body.interfaces),
+        kept=None if kept is None else replace(kept, rotation=length * kept.rotation),
+    )

@@ -1,0 +1,185 @@
+"""Bodies that are interpolated between samples, beside reductions at the same values."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import cms
+from cms.errors import BodyError, JobError, ModalFileError
+from cms.jobs.job import read_job
+from cms.reduction import convert_frame, parametric_body, read_parametric_body, reduce_family, write_parametric_body
+from cms.reduction.parametric.alignment import align, recombined
+from cms.reduction.parametric.interpolation_errors import errors_between
+
+LENGTHS = (1.0, 1.2)
+THICKNESSES = (0.012, 0.017, 0.024)  #: bending in both planes crosses at the width
+WIDTH = 0.02
+N = 8  #: elements
+JOB = """
+[parameters]
+length = 1.0
+thickness = 0.01
+[body]
+nodes = "nodes.csv"
+lines = "lines.csv"
+scale = ["{length}", 1, 1]
+units = "m-kg-s"
+[materials.steel]
+young = 210e9
+poisson = 0.3
+density = 7850
+[sections.bar]
+shape = "rectangle"
+width = 0.02
+height = "{thickness}"
+lines = "bar"
+[interfaces.root]
+kind = "rigid"
+nodes = "root"
+[interfaces.tip]
+kind = "rigid"
+nodes = "tip"
+[reduction]
+set = "craig-bampton-ir"
+n_modes = 4
+frame = "nodal"
+at = "root"
+stress = false
+geometric_stiffness = false
+error_estimates = false
+[damping]
+ratio = 0.01
+"""
+
+
+@pytest.fixture(scope="module")
+def job(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("cantilever")
+    sets = {0: "root", N: "tip"}
+    nodes = "".join(f"{k},{k / N},0,0,{sets.get(k, '')}\n" for k in range(N + 1))
+    (folder / "nodes.csv").write_text("node,x,y,z,sets\n" + nodes)
+    (folder / "lines.csv").write_text("node1,node2,group\n" + "".join(f"{k},{k + 1},bar\n" for k in range(N)))
+    (folder / "cantilever.toml").write_text(JOB)
+    return folder / "cantilever.toml"
+
+
+@pytest.fixture(scope="module")
+def lengths(job):
+    return reduce_family(job, {"length": LENGTHS})
+
+
+@pytest.fixture(scope="module")
+def thicknesses(job):
+    return reduce_family(job, {"thickness": THICKNESSES})
+
+
+def reduced(job, **parameters):
+    return cms.reduce_job(read_job(job, parameters))
+
+
+def test_a_cantilever_between_two_lengths_has_its_frequencies(job, lengths):
+    """Euler-Bernoulli, which is 0.05 % too stiff in the third mode (shear, rotary inertia); and the same elements."""
+    found = lengths.at(length=1.1)
+    beta = np.array([1.8751041, 4.6940911, 7.8547574])
+    exact = beta**2 / (2 * np.pi * 1.1**2) * np.sqrt(210e9 / 7850 * 0.01**2 / 12)
+    bending = np.array([f for f, psi in zip(found.frequencies, found.interface("tip").Psi.T, strict=True)
+                        if abs(psi[2]) > 0.1 * np.abs(psi[:3]).max()])[:3]  # fmt: skip
+    assert_allclose(bending, exact, rtol=float(lengths.errors.frequency[:6].max()) + 5e-4)
+    errors = errors_between(found, reduced(job, length=1.1))
+    assert (errors.frequency <= lengths.errors.frequency + 1e-9).all()
+    assert errors.frequency[:8].max() < 3e-4
+    assert errors.free_frequency.max() < 2e-4
+    assert errors.static < 1e-3
+    assert max(errors.mass, errors.inertia) < 1e-12
+    assert_allclose(found.interface("tip").position, [1.1, 0, 0], rtol=0, atol=1e-12)
+
+
+def test_modes_that_cross_keep_their_identity(job, thicknesses):
+    """Without alignment the modes of both planes change places among the samples, and errors are tens of per cent."""
+    for thickness in (0.015, 0.02, 0.022):
+        errors = errors_between(thicknesses.at(thickness=thickness), reduced(job, thickness=thickness))
+        estimate = thicknesses.errors
+        assert errors.frequency[:8].max() <= estimate.frequency[:8].max() < 5e-3
+        assert errors.free_frequency.max() <= estimate.free_frequency.max()
+        assert errors.static <= estimate.static < 0.1
+        assert errors.mass < 1e-12
+        assert errors.inertia < 1e-3
+
+
+def test_alignment_undoes_signs_and_order_of_modes(thicknesses):
+    body = convert_frame(thicknesses.samples[0], cms.TisserandFrame())
+    rng = np.random.default_rng(0)
+    Z = np.eye(body.n_q)[:, rng.permutation(body.n_q)] * rng.choice([-1.0, 1.0], body.n_q)
+    found, expected = (align(sample, body, "one", "other") for sample in (recombined(body, Z), body))
+    assert_allclose(found.omega2, body.K, rtol=0, atol=1e-10 * body.K.max())
+    Psi = expected.body.interface("tip").Psi
+    assert_allclose(found.body.interface("tip").Psi, Psi, rtol=0, atol=1e-9 * np.abs(Psi).max())
+    assert_allclose(found.body.moments.S_kl, expected.body.moments.S_kl, rtol=0, atol=1e-9 * body.moments.m)
+
+
+def test_a_family_returns_its_samples(thicknesses):
+    for thickness, sample in zip(THICKNESSES, thicknesses.samples, strict=True):
+        found = thicknesses.at(thickness=thickness)
+        errors = errors_between(found, sample)
+        assert max(errors.frequency.max(), errors.free_frequency.max(), errors.static, errors.inertia) < 1e-9
+        assert_allclose(np.abs(found.moments.C1), np.abs(sample.moments.C1), rtol=0, atol=1e-6)
+
+
+def test_an_interpolated_body_is_an_ordinary_modal_file(thicknesses, tmp_path):
+    cms.write(thicknesses.at(thickness=0.02), tmp_path / "bar.h5")
+    checks = {each.name: each.verdict for each in cms.check_body(cms.read(tmp_path / "bar.h5"))}
+    assert "fail" not in checks.values(), checks
+
+
+def test_the_ratio_of_the_damping_is_that_of_the_job(thicknesses):
+    found = thicknesses.at(thickness=0.015)
+    assert_allclose(found.D, np.diag(0.02 * 2 * np.pi * found.frequencies), rtol=1e-9, atol=1e-9 * found.D.max())
+
+
+def test_a_family_file_keeps_everything(thicknesses, tmp_path):
+    write_parametric_body(thicknesses, tmp_path / "family.h5")
+    back = read_parametric_body(tmp_path / "family.h5")
+    assert dict(back.values) == dict(thicknesses.values)
+    assert_array_equal(back.at(thickness=0.02).K, thicknesses.at(thickness=0.02).K)
+    assert_array_equal(back.errors.frequency, thicknesses.errors.frequency)
+    assert back.errors.method == thicknesses.errors.method == "inner values of thickness left out"
+    with pytest.raises(ModalFileError, match="expected a modal-file, got a parametric-body"):
+        cms.read(tmp_path / "family.h5")
+
+
+def test_values_outside_and_other_names_are_refused(lengths):
+    with pytest.raises(BodyError, match=r"length = 1\.3: outside of the sampled range from 1 to 1\.2"):
+        lengths.at(length=1.3)
+    with pytest.raises(BodyError, match="no parameter 'lenght'; did you mean 'length'"):
+        lengths.at(lenght=1.1)
+    with pytest.raises(BodyError, match=r"length: missing; expected a value from 1 to 1\.2"):
+        lengths.at()
+
+
+def test_samples_that_differ_are_refused_by_name(job, lengths):
+    first, last = lengths.samples
+    fewer = reduced(job, length=1.2, **{"reduction.n_modes": 3})
+    with pytest.raises(BodyError, match=r"number of modes: expected 16 at length = 1\.2, as at length = 1, got 15"):
+        parametric_body(lengths.values, [first, fewer])
+    other = replace(last, provenance={**last.provenance, "mode set redundant": "constraint tip rx"})
+    with pytest.raises(
+        BodyError, match=r"columns dropped from the mode set: expected none at .* got constraint tip rx"
+    ):
+        parametric_body(lengths.values, [first, other])
+    renamed = replace(last, interfaces=(last.interfaces[0], replace(last.interfaces[1], name="end")))
+    with pytest.raises(BodyError, match=r"interfaces: expected root, tip at .*, got root, end"):
+        parametric_body(lengths.values, [first, renamed])
+    with pytest.raises(BodyError, match=r"samples length = 1 and length = 1\.2 differ in body\.surface"):
+        parametric_body(lengths.values, [first, replace(last, surface=last.surface[:, ::-1])]).at(length=1.1)
+
+
+def test_modes_that_cross_the_cutoff_are_refused(job):
+    with pytest.raises(BodyError, match=r"modes have no counterpart in .* Take another n_modes"):
+        reduce_family(job, {"thickness": [0.008, 0.03]})
+
+
+def test_values_that_do_not_ascend_are_refused(job):
+    with pytest.raises(JobError, match=r"length: expected two to 7 ascending values, got 1\.2, 1"):
+        reduce_family(job, {"length": [1.2, 1.0]})
