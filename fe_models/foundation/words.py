@@ -45,11 +45,12 @@ def number_list(values: Iterable[float], scale: float | None = None) -> str:
 
 
 def quoted(value: object) -> str:
-    """Return a value of the user for a message: text in quotes, at most 80 characters."""
+    """Return a value of the user for a message: text in quotes, its first line, at most 80 characters."""
     try:
-        text = repr(value)
+        text, *more = repr(value).splitlines() or [""]
     except (RecursionError, ValueError):  # nested too deeply, or an integer with thousands of digits
         return f"<{type(value).__name__}>"
+    text = f"{text} ..." if more else text
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 4]}...{text[-1]}"
 
 
