@@ -185,6 +185,7 @@ def test_what_a_reduced_body_shows_are_its_numbers(objects):
     assert f"{reduced.frequencies[0]:.6g}" in text
     assert reduced.labels[0] in text
     assert "left, right" in text
+    assert "centre of mass  (0, 0, 0) m in the frame" in text  # mean axes
 
 
 def test_a_frequency_in_other_time_units_is_shown_in_hertz():

@@ -22,7 +22,7 @@ from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import Summary, listed, presented
 from fe_models.foundation.records import ArrayShape, FrozenMapping, checked_fields, frozen_copies
 from fe_models.foundation.units import Units
-from fe_models.foundation.words import nearest, quoted
+from fe_models.foundation.words import nearest, number_list, quoted
 from fe_models.meshes.numbering import NONE, Numbering
 
 __all__ = ["BodyFrame", "ReducedBody", "ReducedInterface", "unit_findings"]
@@ -249,11 +249,14 @@ class ReducedBody(Tabular):
 
     def summary(self) -> Summary:
         """Return what `repr` and notebooks show: units, mass, frame and interfaces, and the modes with their labels."""
-        center = ", ".join(f"{x:.6g}" for x in self.moments.center_of_mass)
+        center = number_list(self.moments.center_of_mass, float(np.abs(self.nodes).max(initial=0.0)))
         rows = [
             ("units", self.units.name),
             ("mass", f"{self.moments.m:.6g} {self.units.mass_symbol}"),
-            ("centre of mass", f"({center}) {self.units.length_symbol} in the frame"),
+            (
+                "centre of mass",
+                f"({center}) {self.units.length_symbol} in the frame",
+            ),
             ("frame", self.frame.kind),
             ("interfaces", listed([each.name for each in self.interfaces])),
         ]
