@@ -58,6 +58,15 @@ def test_an_argument_that_is_unknown_is_told(subject):
         subject(nosuch=1)
 
 
+def test_arguments_have_one_order():
+    """System before motion before body; a file after the object that is written to it."""
+    order = ("system", "trajectory", "motion", "body", "path")
+    for each in (param.values[0] for param in PUBLIC if inspect.isroutine(param.values[0])):
+        names = [name for name in required(each) if name in order]
+        assert names == sorted(names, key=order.index), f"{each.__module__}.{each.__name__}: {names}"
+        assert "system" not in names or required(each)[0] == "system", f"{each.__module__}.{each.__name__}"
+
+
 def block(**changes):
     return ff.RigidBody(**{"name": "block", "mass": 2.0, "inertia": np.diag([1.0, 2, 2.5])} | changes)
 
