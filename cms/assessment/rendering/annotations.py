@@ -106,8 +106,10 @@ def draw_triads(draw: Any, scene: Scene, layout: Layout, camera: Camera, frame: 
         origin = camera.project(position)[:2] + offset
         tips = camera.project(position + triad.size * axes.T)[:, :2] + offset - origin
         draw_axes(draw, tuple(origin), tips.T, camera.axes[2] @ axes, u, "")
-        if triad.label:
-            labels.append((origin[0] + 0.7 * u, origin[1] + 0.55 * u, triad.label))
+        x, y = origin[0] + 0.7 * u, origin[1] + 0.55 * u
+        is_there = any(name == triad.label and abs(x - x0) < u and abs(y - y0) < u for x0, y0, name in labels)
+        if triad.label and not is_there:  # two bodies may have interfaces of one name at one joint
+            labels.append((x, y, triad.label))
     boxes: list[tuple[float, float, float, float]] = []
     for x, y, label in labels:
         left, top, right, bottom = draw.textbbox((x, y), label, font=words)

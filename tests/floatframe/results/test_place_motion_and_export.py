@@ -106,6 +106,7 @@ def test_stress_is_the_sum_over_the_modes_and_its_largest_is_found(swing):
     k = len(q) - 1
     stress = nodal_stress(swing, "rod", REDUCED, k)
     assert_allclose(stress, np.einsum("ncq,q->nc", REDUCED.stress, q[k]), rtol=1e-12)
+    assert_array_equal(swing.body("rod").stress(-1), stress)
     xx, yy, zz, yz, xz, xy = stress.T
     deviator = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) - np.eye(3)[:, :, None] * (xx + yy + zz) / 3
     mises = np.sqrt(1.5 * (deviator**2).sum(axis=(0, 1)))

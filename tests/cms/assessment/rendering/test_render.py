@@ -3,6 +3,7 @@ import os
 import subprocess
 import sys
 from dataclasses import fields, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from cms.assessment.rendering import (
     SceneError,
     Surface,
     Triad,
+    annotations,
     render,
     render_animation,
     render_picture,
@@ -474,3 +476,20 @@ def test_labels_of_coinciding_points_stand_below_each_other():
     for a in boxes:
         for b in boxes:
             assert a is b or a[2] < b[0] or b[2] < a[0] or a[3] < b[1] or b[3] < a[1]
+
+
+def test_a_label_of_one_name_at_one_place_is_drawn_once(monkeypatch):
+    """Two bodies have an interface "elbow" at their joint; one that is elsewhere keeps its label."""
+    written = []
+    pen = SimpleNamespace(
+        textbbox=lambda place, text, font: (*place, place[0] + 30, place[1] + 10),
+        rounded_rectangle=lambda *given, **options: None,
+        text=lambda place, text, *style, **options: written.append(text),
+    )
+    monkeypatch.setattr(annotations, "draw_axes", lambda *given: None)
+    places = {"elbow": (0.0, 0, 0), "wrist": (0.0, 0, 0), "elbow ": (0.0, 0, 0), "elbow  ": (200.0, 0, 0)}
+    triads = tuple(Triad(np.array(place), np.eye(3), 0.3, name.strip()) for name, place in places.items())
+    camera = SimpleNamespace(project=np.asarray, axes=np.eye(3))
+    layout = SimpleNamespace(unit=10.0, view=(0, 0, 300, 300))
+    annotations.draw_triads(pen, replace(moving_scene(), triads=triads), layout, camera, 0)
+    assert written == ["elbow", "wrist", "elbow"]
