@@ -8,9 +8,14 @@ from cms.cli.app import app
 __all__ = ["assert_refused", "run_cms"]
 
 
-def run_cms(*words: object, **options: object) -> Result:
-    """Run `cms` with these words in this process; options are those of `CliRunner.invoke`."""
-    return CliRunner().invoke(app, [str(word) for word in words], **options)
+def run_cms(*words: object, code: int | None = None, **options: object) -> Result:
+    """Run `cms` with these words in this process, and expect an exit code if it is given.
+
+    Options are those of `CliRunner.invoke`.
+    """
+    result = CliRunner().invoke(app, [str(word) for word in words], **options)
+    assert code is None or result.exit_code == code, result.output
+    return result
 
 
 def assert_refused(result: Result, *words: str) -> None:

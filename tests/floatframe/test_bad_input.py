@@ -34,8 +34,7 @@ PUSH = '\n[joints.guide.motions.distance]\ntype = "polynomial"\ncoefficients = [
 def refused(folder, text, command="run"):
     """Run the command on a file that it must refuse; return the message."""
     (folder / "crank.toml").write_text(text)
-    result = run_floatframe(command, folder / "crank.toml")
-    assert result.exit_code == 2, result.output
+    result = run_floatframe(command, folder / "crank.toml", code=2)
     errors = [line for line in result.stderr.splitlines() if line.startswith("error: ")]
     assert len(errors) == 1
     assert "Traceback" not in result.output
@@ -98,8 +97,7 @@ def test_a_drive_past_the_reach_of_the_mechanism_tells_time_joint_and_advice_and
         assert words in message
     assert (tmp_path / "crank.h5.segments").is_dir()
     for command in ("plot", "info"):
-        result = run_floatframe(command, tmp_path / "crank.h5.segments")
-        assert result.exit_code == 0
+        result = run_floatframe(command, tmp_path / "crank.h5.segments", code=0)
     assert "did not reach its end" in result.stdout
 
 

@@ -110,6 +110,5 @@ def test_an_entry_of_a_list_may_be_an_expression_but_no_empty_table(schemas, ent
 
 
 def test_an_unknown_kind_is_refused_with_the_nearest():
-    result = run_floatframe("schema", "sytem")
-    assert result.exit_code == 2
+    result = run_floatframe("schema", "sytem", code=2)
     assert "did you mean 'system'?" in result.stderr

@@ -49,8 +49,7 @@ def assert_refused(result, *words):
 
 
 def test_a_good_file_passes_with_exit_code_0(folder):
-    result = run_cms("check", folder / "bar.h5")
-    assert result.exit_code == 0, result.output
+    result = run_cms("check", folder / "bar.h5", code=0)
     for word in ("free-frequencies", "Quality of bar", "tolerance", "pass"):
         assert word in result.stdout
     assert "fail" not in result.stdout
@@ -58,15 +57,13 @@ def test_a_good_file_passes_with_exit_code_0(folder):
 
 
 def test_a_wrong_sign_in_the_file_fails_with_exit_code_1(folder):
-    result = run_cms("check", folder / "wrong.h5")
-    assert result.exit_code == 1
+    result = run_cms("check", folder / "wrong.h5", code=1)
     assert "a mass moment has a wrong sign" in result.stdout
     assert "bar fails: " in result.stdout
 
 
 def test_the_json_of_a_check_is_its_records(folder):
-    result = run_cms("check", folder / "wrong.h5", "--json")
-    assert result.exit_code == 1
+    result = run_cms("check", folder / "wrong.h5", "--json", code=1)
     told = json.loads(result.stdout)
     assert (told["body"], told["verdict"]) == ("bar", "fail")
     by_name = {record["name"]: record for record in told["records"]}
@@ -87,8 +84,7 @@ def test_with_its_job_a_file_is_compared_with_the_full_model(folder):
 
 
 def test_the_file_of_another_job_fails(folder):
-    result = run_cms("check", folder / "poor.h5", "--job", folder / "bar.toml", "--json")
-    assert result.exit_code == 1
+    result = run_cms("check", folder / "poor.h5", "--job", folder / "bar.toml", "--json", code=1)
     told = {record["name"]: record for record in json.loads(result.stdout)["records"]}
     assert told["same-body"]["verdict"] == "fail"
     assert "job" in told["same-body"]["action"]
@@ -133,8 +129,7 @@ def test_bad_input_is_refused_in_one_message(folder, monkeypatch, arguments, wor
 
 def test_the_table_of_a_response_is_that_of_the_function(folder, tmp_path):
     path = tmp_path / "frf.csv"
-    result = run_cms("frf", folder / "bar.h5", *FRF, "-c", "uz", "-c", "rz/uy", "--inertance", "-o", path)
-    assert result.exit_code == 0, result.output
+    result = run_cms("frf", folder / "bar.h5", *FRF, "-c", "uz", "-c", "rz/uy", "--inertance", "-o", path, code=0)
     with path.open() as stream:
         rows = list(csv.reader(stream))
     assert rows[0] == [
@@ -155,8 +150,7 @@ def test_the_table_of_a_response_is_that_of_the_function(folder, tmp_path):
 
 def test_the_full_model_is_drawn_over_the_reduced_one(folder, tmp_path):
     picture, table = tmp_path / "frf.png", tmp_path / "frf.csv"
-    result = run_cms("frf", folder / "bar.h5", *FRF, "--job", folder / "bar.toml", "-o", picture, "-o", table)
-    assert result.exit_code == 0, result.output
+    result = run_cms("frf", folder / "bar.h5", *FRF, "--job", folder / "bar.toml", "-o", picture, "-o", table, code=0)
     assert "Against the full model: below 5 % up to" in result.stdout
     assert "1 % in every free-free mode" in result.stdout
     assert picture.read_bytes()[:4] == b"\x89PNG"

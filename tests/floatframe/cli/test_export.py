@@ -39,7 +39,7 @@ def export(*words):
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("export")
     (folder / "swing.toml").write_text(PENDULUM)
-    assert run_floatframe("run", folder / "swing.toml").exit_code == 0
+    run_floatframe("run", folder / "swing.toml", code=0)
     return folder
 
 

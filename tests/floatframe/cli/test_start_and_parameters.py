@@ -113,8 +113,7 @@ def test_a_run_from_another_system_is_refused(folder, old, new, words):
     run("run", folder / "cart.toml", "-o", folder / "first.h5")
     text = CART.replace(old, new).replace('body_b = "cart"', f'body_b = "{new[:-1] if "]" in new else "cart"}"')
     (folder / "next.toml").write_text(text + 'from = "first.h5"\n')
-    result = run_floatframe("run", folder / "next.toml")
-    assert result.exit_code == 2
+    result = run_floatframe("run", folder / "next.toml", code=2)
     assert "run.from" in result.stderr
     assert words in result.stderr
 
@@ -123,8 +122,7 @@ def test_a_run_does_not_overwrite_the_state_that_it_begins_from(folder):
     run("run", folder / "cart.toml", "-o", folder / "first.h5")
     (folder / "next.toml").write_text('extends = "cart.toml"\n[run]\nfrom = "first.h5"\n')
     for source in ("first.h5", "cart.toml"):
-        result = run_floatframe("run", folder / "next.toml", "-o", folder / source)
-        assert result.exit_code == 2
+        result = run_floatframe("run", folder / "next.toml", "-o", folder / source, code=2)
         assert "this is an input" in result.stderr
 
 
@@ -143,8 +141,7 @@ def test_a_sweep_begins_each_run_in_its_equilibrium(folder):
 
 def test_computations_that_begin_as_placed_refuse_another_start(folder):
     (folder / "cart.toml").write_text(CART + 'start = "equilibrium"\n')
-    result = run_floatframe("gradient", folder / "cart.toml", "-p", "mass", "--out", "up.distance")
-    assert result.exit_code == 2
+    result = run_floatframe("gradient", folder / "cart.toml", "-p", "mass", "--out", "up.distance", code=2)
     assert "run.start: this computation begins with the bodies as placed; remove the key" in result.stderr
 
 
@@ -154,8 +151,7 @@ def test_computations_that_begin_as_placed_refuse_another_start(folder):
 )
 def test_the_key_from_is_called_so_in_messages(folder, line, words):
     (folder / "cart.toml").write_text(CART + line + "\n")
-    result = run_floatframe("run", folder / "cart.toml")
-    assert result.exit_code == 2
+    result = run_floatframe("run", folder / "cart.toml", code=2)
     assert words in result.stderr
     assert "continues" not in result.stderr
 
@@ -171,15 +167,13 @@ def test_set_replaces_parameters_and_keys_and_the_results_record_them(folder):
 
 @pytest.mark.parametrize("command", ["static", "modes", "linearize"])
 def test_analyses_take_the_values_of_set(folder, command):
-    result = run_floatframe(command, folder / "cart.toml", "--set", "nothing=1")
-    assert result.exit_code == 2
+    result = run_floatframe(command, folder / "cart.toml", "--set", "nothing=1", code=2)
     assert "there is no parameter 'nothing'; choices: mass, stiffness" in " ".join(result.stderr.split())
 
 
 @pytest.mark.parametrize("given", ["mass", "=3"])
 def test_set_without_name_or_value_is_refused(folder, given):
-    result = run_floatframe("run", folder / "cart.toml", "--set", given)
-    assert result.exit_code == 2
+    result = run_floatframe("run", folder / "cart.toml", "--set", given, code=2)
     assert "NAME=VALUE" in result.stderr
 
 
@@ -193,8 +187,7 @@ def test_the_shown_file_describes_the_same_system(folder, program):
 
 def test_a_file_of_another_kind_is_refused_with_its_command(folder):
     (folder / "cart.toml").write_text('kind = "system"\n' + CART)
-    result = run_cms("reduce", folder / "cart.toml")
-    assert result.exit_code == 2
+    result = run_cms("reduce", folder / "cart.toml", code=2)
     assert result.stderr.count("\n") == 1
     assert 'expected a file of kind "job"; run this one by floatframe run cart.toml' in result.stderr
 
@@ -202,8 +195,7 @@ def test_a_file_of_another_kind_is_refused_with_its_command(folder):
 def test_a_file_without_kind_but_with_tables_of_another_is_refused_with_its_command(folder):
     """No key of the file belongs to a job; one required table is enough for the list of problems."""
     (folder / "cart.toml").write_text(CART)
-    result = run_cms("reduce", folder / "cart.toml")
-    assert result.exit_code == 2
+    result = run_cms("reduce", folder / "cart.toml", code=2)
     assert result.stderr.count("\n") == 1
     assert 'its tables are those of kind "system"; run it by floatframe run cart.toml' in result.stderr
     (folder / "cart.toml").write_text(CART + "\n[reduction]\n")
@@ -212,8 +204,7 @@ def test_a_file_without_kind_but_with_tables_of_another_is_refused_with_its_comm
 
 def test_an_unknown_kind_is_refused_with_the_nearest(folder):
     (folder / "cart.toml").write_text('kind = "sytem"\n' + CART)
-    result = run_floatframe("run", folder / "cart.toml")
-    assert result.exit_code == 2
+    result = run_floatframe("run", folder / "cart.toml", code=2)
     assert "did you mean 'system'?" in result.stderr
 
 

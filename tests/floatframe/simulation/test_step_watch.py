@@ -540,8 +540,7 @@ rho_inf = 0.5
 ])  # fmt: skip
 def test_the_command_line_prints_the_line_and_files_choose(tmp_path, more, words, says):
     (tmp_path / "swing.toml").write_text(SWING + more)
-    result = run_floatframe("run", tmp_path / "swing.toml", *words)
-    assert result.exit_code == 0, result.output
+    result = run_floatframe("run", tmp_path / "swing.toml", *words, code=0)
     told = json.loads(run_floatframe("info", tmp_path / "swing.h5", "--json").stdout)["validity"]
     assert [note["kind"] for note in told] == ["steps"] * says
     assert ("Notes on the steps of the run" in result.output) == says

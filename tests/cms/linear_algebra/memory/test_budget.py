@@ -199,8 +199,7 @@ def test_a_job_takes_a_budget_and_gives_the_same_body(tmp_path):
 def test_the_command_refuses_budgets_that_do_not_do_and_writes_nothing(tmp_path, line, arguments, words):
     job = write_job(tmp_path, line)
     before = sorted(tmp_path.iterdir())
-    result = run_cms("reduce", job, *arguments)
-    assert result.exit_code == 2, result.output
+    result = run_cms("reduce", job, *arguments, code=2)
     assert re.search(re.escape(words), " ".join(result.output.split()))
     assert sorted(tmp_path.iterdir()) == before
 

@@ -125,8 +125,7 @@ def solver_in(path):
 
 def test_the_command_goes_before_the_job_and_the_file_says_who_factorised(folder, registered):
     def reduced_by(*arguments):
-        result = run_cms("reduce", *arguments, "-o", folder / "out.h5")
-        assert result.exit_code == 0, result.output
+        run_cms("reduce", *arguments, "-o", folder / "out.h5", code=0)
         return solver_in(folder / "out.h5")
 
     superlu = str(folder / "superlu.toml")
@@ -154,7 +153,6 @@ def test_jobs_of_a_fleet_take_the_solver_too(folder, registered):
 def test_the_command_refuses_solvers_that_are_not_there_and_writes_nothing(tmp_path, registered, arguments, words):
     write_matrices(tmp_path)
     before = sorted(tmp_path.iterdir())
-    result = run_cms("reduce", tmp_path / arguments[0], *arguments[1:])
-    assert result.exit_code == 2
+    result = run_cms("reduce", tmp_path / arguments[0], *arguments[1:], code=2)
     assert words in " ".join(result.output.split())
     assert sorted(tmp_path.iterdir()) == before

@@ -191,8 +191,7 @@ def test_best_values_in_a_base_file_are_written_into_the_file_that_results(copie
 
 def test_a_system_is_not_written_away_from_the_files_that_it_names(copied):
     folder = copied("absorber")
-    refused = run_floatframe("optimize", folder / "peak.toml", "-o", folder.parent / "best.toml")
-    assert refused.exit_code == 2
+    refused = run_floatframe("optimize", folder / "peak.toml", "-o", folder.parent / "best.toml", code=2)
     assert "expected the folder of" in " ".join(refused.stderr.split())
 
 

@@ -81,8 +81,7 @@ def result(folder):
 
 
 def test_the_command_writes_page_record_and_table(folder):
-    found = run_floatframe("shake", folder / "bar.toml")
-    assert found.exit_code == 0, found.output
+    found = run_floatframe("shake", folder / "bar.toml", code=0)
     assert "1 g = 9.80665 m/s²" in found.output
     record = json.loads((folder / "bar.shake.json").read_text())
     with (folder / "bar.shake.csv").open() as file:
@@ -103,8 +102,7 @@ def test_the_command_writes_page_record_and_table(folder):
 
 def test_the_options_of_a_modal_file_make_the_same_run(folder):
     options = ["--base", "left", "--Q", "25", "--sine", "5:1,100:1", "--rate", "4", "--directions", "z", "--json"]
-    found = run_floatframe("shake", folder / "bar.h5", *options)
-    assert found.exit_code == 0, found.output
+    found = run_floatframe("shake", folder / "bar.h5", *options, code=0)
     own = {row["output"]: row["value"] for row in json.loads(found.stdout)["table"]}
     job = ff.durability.shaking.shake(ff.durability.shaking.read_shake(folder / "bar.toml"))
     names = [output.name for output in job.sine[0].outputs]
@@ -140,8 +138,7 @@ def test_a_long_record_has_its_curves_in_a_file_of_arrays(folder, result, monkey
     monkeypatch.setattr("floatframe.durability.shaking.record.MOST_NUMBERS", n)
     assert light_record(record, "a.npz") == (record, {})  # few numbers stay
     monkeypatch.setattr("floatframe.durability.shaking.record.MOST_NUMBERS", 1000)
-    found = run_floatframe("shake", folder / "bar.toml", "-o", folder / "long.json")
-    assert found.exit_code == 0, found.output
+    found = run_floatframe("shake", folder / "bar.toml", "-o", folder / "long.json", code=0)
     assert "long.npz" in found.output
     light = json.loads((folder / "long.json").read_text())
     assert light["curves"] == {"file": "long.npz", "key": "array", "missing": "NaN"}
@@ -224,8 +221,7 @@ def test_bad_files_are_refused_in_words(folder, old, new, words):
     assert old in text
     path = Path(folder / "bad.toml")
     path.write_text(text.replace(old, new))
-    found = run_floatframe("shake", path, "-o", folder / "bad.csv")
-    assert found.exit_code == 2, found.output
+    found = run_floatframe("shake", path, "-o", folder / "bad.csv", code=2)
     assert words in found.output
     assert not (folder / "bad.csv").exists()
 

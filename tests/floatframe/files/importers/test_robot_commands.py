@@ -23,8 +23,7 @@ from tests.floatframe.files.importers.flexible_arm import ARM, EI, GRAVITY, LENG
 
 def test_the_written_folder_is_the_same_system_and_runs(gripper, tmp_path):
     folder = tmp_path / "out"
-    result = run_floatframe("import", gripper, "-o", folder, "--at", "slide=0.2", "--at", "knuckle=0.1")
-    assert result.exit_code == 0, result.output
+    result = run_floatframe("import", gripper, "-o", folder, "--at", "slide=0.2", "--at", "knuckle=0.1", code=0)
     assert "note: 2 × <gazebo> not read" in result.stderr
     system, options = read_system(folder / "gripper.toml")
     expected = robot_system(read_urdf(gripper), configuration={"slide": 0.2, "knuckle": 0.1}).system
@@ -39,20 +38,17 @@ def test_the_written_folder_is_the_same_system_and_runs(gripper, tmp_path):
     assert options.t_end == 1.0
     file = folder / "gripper.toml"
     file.write_text(file.read_text().replace("t_end = 1.0", "t_end = 0.02"))
-    result = run_floatframe("run", file, "-o", folder / "out.h5")
-    assert result.exit_code == 0, result.output
+    result = run_floatframe("run", file, "-o", folder / "out.h5", code=0)
     assert read_results(folder / "out.h5").is_complete
 
 
 def test_a_system_file_becomes_a_description_with_the_same_dynamics(gripper, tmp_path):
     run_floatframe("import", gripper, "-o", tmp_path / "out", "--keep-fixed")
-    result = run_floatframe("export", tmp_path / "out" / "gripper.toml", "-o", tmp_path / "back" / "g.urdf")
-    assert result.exit_code == 2
+    result = run_floatframe("export", tmp_path / "out" / "gripper.toml", "-o", tmp_path / "back" / "g.urdf", code=2)
     assert "URDF requires limits of a prismatic joint; effort, velocity not given" in result.stderr
     assert not (tmp_path / "back").exists()
     system, urdf = tmp_path / "out" / "gripper.toml", tmp_path / "back" / "g.urdf"
-    result = run_floatframe("export", system, "-o", urdf, "--effort", 9, "--velocity", 2)
-    assert result.exit_code == 0, result.output
+    result = run_floatframe("export", system, "-o", urdf, "--effort", 9, "--velocity", 2, code=0)
     assert "note: omitted: gravity" in result.stderr
     assert (tmp_path / "back" / "meshes" / "finger_0.stl").is_file()
     given, back = (robot_system(read_urdf(path)).system for path in (gripper, tmp_path / "back" / "g.urdf"))
@@ -80,8 +76,7 @@ def test_info_tells_links_and_joints(gripper):
     ],
 )
 def test_bad_options_write_nothing(gripper, tmp_path, words, message):
-    result = run_floatframe("import", gripper, "-o", tmp_path / "out", *words)
-    assert result.exit_code == 2
+    result = run_floatframe("import", gripper, "-o", tmp_path / "out", *words, code=2)
     assert message in result.stderr
     assert not (tmp_path / "out").exists()
 

@@ -14,13 +14,12 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("view")
     (folder / "swing.toml").write_text(RIGID + '\n[[bodies.stick.shapes]]\ntype = "box"\nsize = [1.0, 0.1, 0.1]\n')
     (folder / "pendulum.toml").write_text(PENDULUM)
-    assert run_floatframe("run", folder / "swing.toml").exit_code == 0
+    run_floatframe("run", folder / "swing.toml", code=0)
     return folder
 
 
 def test_a_page_stands_beside_the_results_and_the_command_says_what_it_leaves_out(folder):
-    result = run_floatframe("view", folder / "swing.h5")
-    assert result.exit_code == 0, result.output
+    result = run_floatframe("view", folder / "swing.h5", code=0)
     assert "interpolated linearly" in result.output
     read = ReadPage(folder / "swing.html")
     assert [piece["carrier"] for piece in read.record["pieces"] if piece["kind"] == "body"] == [1]
@@ -28,9 +27,9 @@ def test_a_page_stands_beside_the_results_and_the_command_says_what_it_leaves_ou
 
 
 def test_a_system_file_gives_its_modes_or_its_equilibrium(folder):
-    assert run_floatframe("view", folder / "pendulum.toml").exit_code == 0
+    run_floatframe("view", folder / "pendulum.toml", code=0)
     assert ReadPage(folder / "pendulum.html").record["kind"] == "modes"
-    assert run_floatframe("view", folder / "pendulum.toml", "--rest", "-o", folder / "rest.html").exit_code == 0
+    run_floatframe("view", folder / "pendulum.toml", "--rest", "-o", folder / "rest.html", code=0)
     assert ReadPage(folder / "rest.html").record["facts"][0] == "equilibrium"
 
 
@@ -52,8 +51,7 @@ def test_a_system_file_gives_its_modes_or_its_equilibrium(folder):
 def test_messages_name_what_was_expected(folder, monkeypatch, arguments, words):
     monkeypatch.chdir(folder)
     before = sorted(folder.iterdir())
-    result = run_floatframe("view", *arguments)
-    assert result.exit_code == 2
+    result = run_floatframe("view", *arguments, code=2)
     assert words in " ".join(result.stderr.split())
     assert sorted(folder.iterdir()) == before
 
@@ -61,7 +59,7 @@ def test_messages_name_what_was_expected(folder, monkeypatch, arguments, words):
 def test_a_modal_file_that_is_gone_or_another_is_named(folder):
     write(synthetic_reduced_body(), folder / "part.h5")
     (folder / "spin.toml").write_text(FLEXIBLE)
-    assert run_floatframe("run", folder / "spin.toml").exit_code == 0
+    run_floatframe("run", folder / "spin.toml", code=0)
     write(synthetic_reduced_body(seed=1), folder / "part.h5")
     assert "has changed since" in run_floatframe("view", folder / "spin.h5").stderr
     (folder / "part.h5").unlink()
