@@ -4,6 +4,7 @@ import resource
 import subprocess
 import sys
 from dataclasses import fields, is_dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import h5py
@@ -75,6 +76,7 @@ def test_a_file_of_version_1_is_read_as_it_was_written():
     assert differences(replace(bare, interfaces=same), old) == []
 
 
+@cache
 def bar_in(units):
     """Return a reduced bar of 1 m in a unit system."""
     metre = 1 / units.to_si(length=1)
