@@ -238,7 +238,7 @@ def write_cell_stress(nodes, cells, of_cell, tensors, dN, u, part, n_parts, sigm
             write_stress(H, tensors[of_cell[e]], 1.0, sigma[e, q])
 
 
-@jit
+@jit_fast
 def add_stress_defects(
     nodes, cells, of_cell, tensors, compliances, N, dN, w, u, rows, recovered, part, n_parts, defect, energy
 ):
@@ -261,20 +261,20 @@ def add_stress_defects(
             det = jacobian(x, dN[q], J, Q)
             add_gradient(u, cells[e], dN[q], Q, det, H)
             write_stress(H, tensors[of_cell[e]], 1.0, sigma)
-            for c in range(6):
-                for k in range(n_k):
-                    d[c, k] = -sigma[c, k]
+            d[:] = -sigma
             for a in range(cells.shape[1]):
                 at, factor = rows[e, a], N[q, a]
                 for c in range(d.shape[0]):
                     row, column = d[c], recovered[at, c]
                     for k in range(n_k):
                         row[k] += factor * column[k]
-            for b in range(6):
-                for c in range(6):
-                    s = S[b, c] * w[q] * det
+            for b in range(d.shape[0]):
+                for c in range(b + 1):
+                    s = (1.0 if b == c else 2.0) * S[b, c] * w[q] * det
                     if s == 0.0:
                         continue
+                    d_b, d_c, sigma_b, sigma_c = d[b], d[c], sigma[b], sigma[c]
+                    of_defect, of_energy = defect[e], energy[e]
                     for k in range(n_k):
-                        defect[e, k] += s * d[b, k] * d[c, k]
-                        energy[e, k] += s * sigma[b, k] * sigma[c, k]
+                        of_defect[k] += s * d_b[k] * d_c[k]
+                        of_energy[k] += s * sigma_b[k] * sigma_c[k]
