@@ -41,9 +41,11 @@ def modes_of(body, n=6):
 @pytest.fixture(scope="module")
 def exact():
     """Frequencies with a fine mesh."""
-    return {
-        ports: modes_of(sheared((6, 4, 4), "hexahedron20", ports=ports)).free_frequencies for ports in ((), ("left",))
-    }
+    found = {}
+    for ports in ((), ("left",)):
+        with Families(fm.couple(sheared((6, 4, 4), "hexahedron20", ports=ports))) as families:
+            found[ports] = families.free_modes(4).frequencies
+    return found
 
 
 @pytest.mark.parametrize("ports", [(), ("left",)], ids=["free", "rigid face"])
