@@ -39,7 +39,7 @@ class MeshErrors:
 
 def mesh_errors(body: FEBody, basis: FreeBasis, n: int) -> MeshErrors:
     """Estimate the errors of the lowest n free frequencies by the mesh."""
-    reason = without_estimate(body.element_model)
+    reason = without_estimate(body.element_model) if n else "no free frequency is below the cutoff of the set"
     if reason:
         return MeshErrors(np.full(n, np.nan), "", f"none: {reason}")
     assert body.element_model is not None

@@ -10,7 +10,8 @@ import cms
 import fe_models as fm
 from cms.modes.families.families import Families
 from cms.modes.mode_sets import MODE_SETS
-from cms.reduction.mesh_error import LARGEST, frequency_errors, loaded_nodes
+from cms.reduction.basis.free_basis import free_basis
+from cms.reduction.mesh_error import LARGEST, frequency_errors, loaded_nodes, mesh_errors
 from cms.reduction.reduction import reduce
 from fe_models.body.fe_body import Interface
 from fe_models.elements.recovery.mesh_error import EnergyErrors
@@ -119,3 +120,11 @@ def test_the_errors_survive_a_file_and_a_file_without_them_is_read(tmp_path):
     old = replace(made, errors=replace(made.errors, mesh=np.zeros(0), mesh_sign="", mesh_method=""))
     cms.write(old, tmp_path / "old.h5")
     assert len(cms.read(tmp_path / "old.h5").errors.mesh) == 0
+
+
+def test_a_set_without_judged_frequencies_has_no_estimate():
+    body = fm.couple(sheared((2, 1, 1), "hexahedron", ports=("left",)))
+    with Families(body) as families:
+        found = mesh_errors(body, free_basis(body, MODE_SETS["craig-bampton"](families, n_modes=1), families), 0)
+    assert found.method == "none: no free frequency is below the cutoff of the set"
+    assert len(found.frequency) == 0
