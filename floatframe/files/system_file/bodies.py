@@ -31,7 +31,7 @@ RIGID_KEYS = ("inertia_axes", "inertia_about", "positive_products")
 
 
 MODE_KEYS = ("modes", "without_modes", "is_rigid")
-FLEXIBLE_KEYS = (*MODE_KEYS, "q", "q_dot")
+FLEXIBLE_KEYS = (*MODE_KEYS, "at", "q", "q_dot")
 
 
 class MassSection(Table):
@@ -51,6 +51,9 @@ class BodySection(Table):
 
     file: Annotated[Path, BeforeValidator(existing_file("modal file"))] | None = Field(
         None, description="the path of a modal file, relative to the system file"
+    )
+    at: dict[str, float] | None = Field(
+        None, description="a table {length = 1.1}: values of the parameters, if file is a family (cms family)"
     )
     mass: Positive | None = Field(None, description="a number above 0, the mass of a rigid body")
     inertia: Matrix3 | None = Field(None, description="the inertia tensor about the centre of mass, three rows")
@@ -131,10 +134,10 @@ def body_of(name: str, section: BodySection, files: dict[Any, ReducedBody], unit
     if section.file is None:
         assert section.mass is not None  # ensured by the validation of the table
         return RigidBody(name, **rigid_mass(section).arguments, **motion)
-    if section.file not in files:
+    if source_key(section) not in files:
         try:
-            reduced = read(section.file)
-            files[section.file] = convert_units(reduced, units)
+            reduced = reduced_of(section)
+            files[source_key(section)] = convert_units(reduced, units)
         except CmsError as error:
             raise ModelError(f"bodies.{name}.file: {error}") from error
         if reduced.units != units:
@@ -150,7 +153,23 @@ def body_of(name: str, section: BodySection, files: dict[Any, ReducedBody], unit
         motion[key] = np.array(values or ())
     motion["leave_out_missing"] = bool(section.leave_out_missing)
     motion["stiffening"] = "auto" if section.stiffening is None else section.stiffening
-    return FlexibleBody(name, reduced, source=str(section.file.resolve()), **motion)
+    source = str(section.file.resolve()) if section.at is None else ""  # a body of a family has no modal file
+    return FlexibleBody(name, reduced, source=source, **motion)
+
+
+def source_key(section: BodySection) -> Any:
+    """Return what identifies the reduced body of a table before its changes: its file, and parameters of a family."""
+    return section.file if section.at is None else (section.file, repr(sorted(section.at.items())))
+
+
+def reduced_of(section: BodySection) -> ReducedBody:
+    """Return the body of the modal file, or of the family at its parameters."""
+    assert section.file is not None  # ensured by the caller
+    if section.at is None:
+        return read(section.file)
+    from cms.reduction.parametric.family_file import read_parametric_body
+
+    return read_parametric_body(section.file).at(**section.at)
 
 
 def rigid_mass(section: BodySection) -> MassProperties:
@@ -176,9 +195,9 @@ def rigid_mass(section: BodySection) -> MassProperties:
 def changed_body(section: BodySection, files: dict[Any, ReducedBody]) -> ReducedBody:
     """Return the reduced body with the requested modes and masses; instances with the same request share it."""
     chosen = [getattr(section, name) for name in MODE_KEYS]
-    key = (section.file, repr(chosen), repr(section.masses))
+    key = (source_key(section), repr(chosen), repr(section.masses))
     if key not in files:
-        body = files[section.file]
+        body = files[source_key(section)]
         if section.modes is not None:
             body = with_modes(body, section.modes)
         if section.without_modes is not None:

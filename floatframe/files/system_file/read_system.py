@@ -209,6 +209,7 @@ def read_system(
         name = data.system.name or path.stem
         sensors = [section.object_named(key) for key, section in data.sensors.items()]
         data_files = [*content.files[1:], *(each.file for each in data.signals.values()), *element_files]
+        data_files += [section.file for section in data.bodies.values() if section.file and section.at is not None]
         modules = (section.module_file(path.parent) for section in data.controllers.values())
         data_files += [file for file in modules if file is not None]
         if data.run is not None and data.run.continues is not None:
