@@ -43,7 +43,7 @@ def family_command(
     """
     from cms.fleet import inputs_of
     from cms.jobs.job import read_job
-    from cms.jobs.studies.family_of_job import reduce_family
+    from cms.family import reduce_family
     from cms.reduction.parametric.family_file import write_parametric_body
 
     values = values_of(over)
