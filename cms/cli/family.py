@@ -41,9 +41,9 @@ def family_command(
 
     Example: cms family rod.toml --over length=1.0:1.2:3 --over thickness=0.008,0.01,0.012
     """
+    from cms.family import reduce_family
     from cms.fleet import inputs_of
     from cms.jobs.job import read_job
-    from cms.family import reduce_family
     from cms.reduction.parametric.family_file import write_parametric_body
 
     values = values_of(over)

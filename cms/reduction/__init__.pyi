@@ -1,5 +1,5 @@
-from cms.fleet import reduce_fleet as reduce_fleet
 from cms.family import reduce_family as reduce_family
+from cms.fleet import reduce_fleet as reduce_fleet
 
 from .assumed_mode_beams.assumed_beam import beam_from_assumed_modes as beam_from_assumed_modes
 from .basis.damping import ModalDamping as ModalDamping

@@ -32,7 +32,15 @@ from cms.body.invariants import NEGATIVITY
 from cms.body.reduced_body import ReducedBody
 from cms.errors import BodyError
 from cms.linear_algebra.solvers.eigen import orientation
-from cms.reduction.parametric.alignment import AlignedSample, align, divisors, recombined, rescaled
+from cms.reduction.parametric.alignment import (
+    AlignedSample,
+    align,
+    divisors,
+    in_frame,
+    in_mean_axes,
+    recombined,
+    rescaled,
+)
 from cms.reduction.parametric.blending import blended
 from cms.reduction.parametric.interpolation_errors import (
     InterpolationErrors,
@@ -40,7 +48,6 @@ from cms.reduction.parametric.interpolation_errors import (
     largest_errors,
     sum_of_errors,
 )
-from cms.reduction.parametric.mean_axes import in_frame, in_mean_axes
 from cms.reduction.reduction import OF_MASSES
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ArgumentError
