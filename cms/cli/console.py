@@ -185,7 +185,7 @@ def print_help(program: TyperGroup, ctx: Any) -> None:
         table = Table.grid(padding=(0, 1), pad_edge=True)
         table.add_column(no_wrap=True, style="bold cyan")
         for name, meaning in rows:
-            table.add_row(f"{name:<10}", meaning)
+            table.add_row(f"{name:<11}", meaning)
         console.print(table)
 
 

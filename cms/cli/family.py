@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
 from cms.cli.arguments import Output, SetValues, Solver, changes_of
@@ -65,6 +64,8 @@ def family_command(
 
 def values_of(given: list[str]) -> dict[str, tuple[float, ...]]:
     """Return the values of each parameter from NAME=FROM:TO:N or NAME=A,B,C."""
+    import numpy as np
+
     found: dict[str, tuple[float, ...]] = {}
     for each in given:
         name, _, text = each.partition("=")

@@ -306,7 +306,7 @@ def test_a_command_under_another_name_is_answered_with_its_name_here(program, na
 GROUPS = {
     "cms": {
         "Model": "demo job faces converge split schema",
-        "Reduce": "run reduce modes frame",
+        "Reduce": "run reduce modes frame family interpolate",
         "Judge": "check accept compare correlate frf",
         "Exchange": "import export recovery formats",
         "Look": "info view show",
