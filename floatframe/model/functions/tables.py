@@ -64,7 +64,15 @@ def between(t: Array, coefficients: Array, first: tuple[float, ...], last: tuple
 
 
 def linear_table(t: Array, values: Array) -> TimeFunction:
-    """Return linear interpolation of a table, constant outside; only for forces, because motions must be smooth."""
+    """Return linear interpolation of a table, constant outside; only for forces, because motions must be smooth.
+
+    Parameters
+    ----------
+    t
+        Times, rising, (n,) [s].
+    values
+        Values at these times, (n,).
+    """
     t, values = checked_table("linear table", t, values, 2)
     slopes = np.diff(values) / np.diff(t)
     return between(t, np.column_stack([values[:-1], slopes]), (values[0],), (values[-1],))
@@ -74,6 +82,13 @@ def monotone_table(t: Array, values: Array) -> TimeFunction:
     """Return the monotone cubic spline (PCHIP) of a table: no overshoot, smooth rate, acceleration jumps at points.
 
     Beyond its ends it continues along its tangents.
+
+    Parameters
+    ----------
+    t
+        Times, rising, (n,) [s].
+    values
+        Values at these times, (n,).
     """
     from scipy.interpolate import PchipInterpolator
 
@@ -87,6 +102,13 @@ def quintic_table(t: Array, values: Array) -> TimeFunction:
     """Return the quintic spline through a table, with four continuous derivatives.
 
     Beyond its ends it continues along its tangents, so its acceleration jumps there unless it ends at zero.
+
+    Parameters
+    ----------
+    t
+        Times, rising, (n,) [s].
+    values
+        Values at these times, (n,).
     """
     from scipy.interpolate import PPoly, make_interp_spline
 

@@ -251,7 +251,15 @@ def moved_piece(c: Array, x: float) -> Array:
 
 
 def table(t: Array, values: Array) -> TimeFunction:
-    """Return the cubic spline (not-a-knot) of a table, which continues along its end tangents."""
+    """Return the cubic spline (not-a-knot) of a table, which continues along its end tangents.
+
+    Parameters
+    ----------
+    t
+        Times, rising, (n,) [s].
+    values
+        Values at these times, (n,).
+    """
     from scipy.interpolate import CubicSpline
 
     t, values = np.array(t, dtype=float), np.array(values, dtype=float)
@@ -269,6 +277,15 @@ def table(t: Array, values: Array) -> TimeFunction:
 
 def sampled(function: Callable[[float], float], t_start: float, t_end: float, tolerance: float) -> TimeFunction:
     """Return a spline of a Python function; the number of knots doubles until errors between them are below tolerance.
+
+    Parameters
+    ----------
+    function
+        Function of the time [s].
+    t_start, t_end
+        Times between which it is sampled [s].
+    tolerance
+        Largest error of the spline between its knots, in the unit of the values.
 
     Raises
     ------
