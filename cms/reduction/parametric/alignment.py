@@ -152,16 +152,24 @@ def in_mean_axes(sample: ReducedBody) -> ReducedBody:
 
 
 def in_frame(body: ReducedBody, frame: BodyFrame, provenance: dict[str, str]) -> ReducedBody:
-    """Return a body of mean axes in another frame, with this provenance and the damping that it states."""
-    axes, origin = axes_of(frame), vector(frame.origin)
-    if body.is_held:
-        made = body
-    elif frame.kind == "nodal":
-        dofs = None if frame.at else tuple((int(node), int(component)) for node, component in frame.dofs)
-        made = convert_frame(body, NodalFrame(frame.at or None, origin, axes, dofs))
-    else:
-        made = convert_frame(body, FRAMES[frame.kind](origin=origin, axes=axes))
-    made = replace(made, provenance=provenance)
+    """Return a body of mean axes in another frame, with this provenance and the damping that it states.
+
+    The momentum of its modes, which interpolation leaves, is removed first, and gives the free frequencies. Rotated and
+    distributed loads of the geometric stiffness are left out: they follow from the moments, which interpolated ones do
+    not exactly.
+    """
+    axes, origin, made = axes_of(frame), vector(frame.origin), body
+    if not body.is_held:
+        made = convert_frame(body, TisserandFrame(axes=axes))
+        free = made.frequencies[: len(body.free_frequencies)]
+        if frame.kind == "nodal":
+            dofs = None if frame.at else tuple((int(node), int(component)) for node, component in frame.dofs)
+            made = convert_frame(made, NodalFrame(frame.at or None, origin, axes, dofs))
+        else:
+            made = convert_frame(made, FRAMES[frame.kind](origin=origin, axes=axes))
+        made = replace(made, free_frequencies=free)
+    geometric = None if made.geometric is None else replace(made.geometric, turned=None, spread=None)
+    made = replace(made, provenance=provenance, geometric=geometric)
     return replace(made, D=made.D + stated_damping(made))
 
 

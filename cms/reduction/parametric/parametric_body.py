@@ -280,6 +280,20 @@ def point_name(point: Mapping[str, float]) -> str:
     return ", ".join(f"{name} = {x:g}" for name, x in point.items())
 
 
+def with_rigid_members(body: ReducedBody) -> ReducedBody:
+    """Return the body whose members of rigid interfaces move rigidly, u + theta × arm.
+
+    Sums of such motions of samples do not, because the arms of the samples differ.
+    """
+    Phi = np.array(body.Phi)
+    for interface in body.interfaces:
+        if interface.kind == "rigid" and interface.has_rotation:
+            arms = body.nodes[interface.members] - interface.position
+            turns = np.cross(interface.Psi[3:].T[None], arms[:, None])
+            Phi[interface.members] = interface.Psi[:3] + np.moveaxis(turns, 1, 2)
+    return replace(body, Phi=Phi)
+
+
 def require_same_reduction(samples: Sequence[ReducedBody], names: Sequence[str]) -> None:
     """Raise `BodyError` unless all samples have the same number of modes, mode set, columns and interfaces."""
     first = samples[0]
@@ -338,7 +352,7 @@ def interpolated(aligned: Sequence[AlignedSample], weights: Weights, near: int, 
     mixed = blended(alike, weights.entries, "body", names)  # (5)
     radii = np.array([each.radii for each in aligned])
     mean = np.where((radii > 0).all(axis=0), np.exp(weights.logarithms @ np.log(divisors(radii))), 0.0)
-    mixed = rescaled(mixed, 1 / divisors(mean), 1 / float(np.linalg.norm(mean)))
+    mixed = with_rigid_members(rescaled(mixed, 1 / divisors(mean), 1 / float(np.linalg.norm(mean))))
     L = sum(weight * each.log_stiffness for weight, each in zip(weights.logarithms, aligned, strict=True))  # (4)
     logarithms, Z = np.linalg.eigh((L + L.T) / 2)  # (6)
     omega2 = np.exp(logarithms)
