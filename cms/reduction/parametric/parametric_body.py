@@ -20,7 +20,7 @@ References
 .. [1] Arsigny et al. (2007); Amsallem & Farhat (2011) for reduced models, docs/bibliography.md.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -66,6 +66,14 @@ SAME_REDUCTION = {
     "mode set": "mode set",
     "mode set redundant": "columns dropped from the mode set",
     "mode set columns": "number of columns of the mode set",
+}
+
+SAME_MODES = "Give n_modes a number instead of a cutoff or an error, and the same to all samples"
+SAME_MESH = "A parameter may move nodes, but not change their number: scale one mesh instead of meshing anew"
+#: numbers of things that must agree among the samples
+SIZES: dict[str, Callable[[ReducedBody], int]] = {
+    "number of kept nodes": lambda body: len(body.nodes),
+    "number of nodes with rotations": lambda body: 0 if body.kept is None else len(body.kept.nodes),
 }
 
 
@@ -296,7 +304,7 @@ def with_rigid_members(body: ReducedBody) -> ReducedBody:
 
 def require_same_reduction(samples: Sequence[ReducedBody], names: Sequence[str]) -> None:
     """Raise `BodyError` unless all samples have the same number of modes, mode set, columns and interfaces."""
-    first = samples[0]
+    first, of_reduction = samples[0], SAME_REDUCTION.items()
     for sample, name in zip(samples, names, strict=True):
         if (np.diag(sample.M) <= 0).any():
             raise BodyError(
@@ -307,15 +315,15 @@ def require_same_reduction(samples: Sequence[ReducedBody], names: Sequence[str])
             raise BodyError(
                 f"parametric body: {name}: quadratic modes cannot be interpolated; leave quadratic_modes out of the job"
             )
-        remedy = "Give n_modes a number instead of a cutoff or an error, and the same to all samples"
-        facts: list[tuple[str, Any, Any]] = [("number of modes", first.n_q, sample.n_q)]
-        facts += [(what, first.provenance.get(k), sample.provenance.get(k)) for k, what in SAME_REDUCTION.items()]
-        of_interfaces = [", ".join(each.name for each in body.interfaces) or "none" for body in (first, sample)]
-        for what, expected, got in [*facts, ("interfaces", *of_interfaces)]:
+        facts: list[tuple[str, Any, Any, str]] = [("number of modes", first.n_q, sample.n_q, SAME_MODES)]
+        facts += [(what, first.provenance.get(k), sample.provenance.get(k), SAME_MODES) for k, what in of_reduction]
+        names_of = [", ".join(each.name for each in body.interfaces) or "none" for body in (first, sample)]
+        facts.append(("interfaces", names_of[0], names_of[1], "Name the interfaces alike in all samples"))
+        facts += [(what, size(first), size(sample), SAME_MESH) for what, size in SIZES.items()]
+        for what, expected, got, remedy in facts:
             if expected != got:
                 raise BodyError(
-                    f"parametric body: {what}: expected {expected} at {name}, as at {names[0]}, got {got}. "
-                    f"{'Name the interfaces alike in all samples' if what == 'interfaces' else remedy}"
+                    f"parametric body: {what}: expected {expected} at {name}, as at {names[0]}, got {got}. {remedy}"
                 )
 
 

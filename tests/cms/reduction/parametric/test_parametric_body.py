@@ -12,6 +12,7 @@ from cms.jobs.job import read_job
 from cms.reduction import convert_frame, parametric_body, read_parametric_body, reduce_family, write_parametric_body
 from cms.reduction.parametric.alignment import align, recombined
 from cms.reduction.parametric.interpolation_errors import errors_between
+from fe_models.meshes.numbering import Numbering
 
 LENGTHS = (1.0, 1.2)
 THICKNESSES = (0.012, 0.017, 0.024)  #: bending in both planes crosses at the width
@@ -138,13 +139,13 @@ def test_the_ratio_of_the_damping_is_that_of_the_job(thicknesses):
     assert_allclose(found.D, np.diag(0.02 * 2 * np.pi * found.frequencies), rtol=1e-9, atol=1e-9 * found.D.max())
 
 
-def test_a_family_file_keeps_everything(thicknesses, tmp_path):
-    write_parametric_body(thicknesses, tmp_path / "family.h5")
+def test_a_family_file_keeps_everything(lengths, tmp_path):
+    write_parametric_body(lengths, tmp_path / "family.h5")
     back = read_parametric_body(tmp_path / "family.h5")
-    assert dict(back.values) == dict(thicknesses.values)
-    assert_array_equal(back.at(thickness=0.02).K, thicknesses.at(thickness=0.02).K)
-    assert_array_equal(back.errors.frequency, thicknesses.errors.frequency)
-    assert back.errors.method == thicknesses.errors.method == "inner values of thickness left out"
+    assert dict(back.values) == dict(lengths.values)
+    assert_array_equal(back.at(length=1.05).K, lengths.at(length=1.05).K)
+    assert_array_equal(back.errors.frequency, lengths.errors.frequency)
+    assert back.errors.method == lengths.errors.method == "a reduction at length = 1.1"
     with pytest.raises(ModalFileError, match="expected a modal-file, got a parametric-body"):
         cms.read(tmp_path / "family.h5")
 
@@ -173,6 +174,33 @@ def test_samples_that_differ_are_refused_by_name(job, lengths):
         parametric_body(lengths.values, [first, renamed])
     with pytest.raises(BodyError, match=r"samples length = 1 and length = 1\.2 differ in body\.surface"):
         parametric_body(lengths.values, [first, replace(last, surface=last.surface[:, ::-1])]).at(length=1.1)
+
+
+def test_samples_of_other_meshes_are_refused(lengths):
+    first, last = lengths.samples
+    n = len(last.nodes) - 1
+    other = replace(
+        last, nodes=last.nodes[:n], node_ids=last.node_ids[:n], Phi=last.Phi[:n], surface=np.zeros((0, 3), np.int64),
+        numbering=Numbering(), kept=None, interfaces=tuple(replace(each, members=[]) for each in last.interfaces),
+    )  # fmt: skip
+    with pytest.raises(BodyError, match=r"number of kept nodes: expected \d+ at .* scale one mesh instead"):
+        parametric_body(lengths.values, [first, other])
+
+
+def test_two_parameters_are_interpolated_together(job):
+    """Their errors are those in the middle of both, and stay within a factor elsewhere."""
+    over = {"length": (1.0, 1.1), "thickness": (0.011, 0.013)}
+    family = reduce_family(job, over)
+    assert family.names[1] == "length = 1, thickness = 0.013"
+    assert family.errors.method == "a reduction at length = 1.05, thickness = 0.012"
+    errors = errors_between(family.at(length=1.04, thickness=0.0125), reduced(job, length=1.04, thickness=0.0125))
+    assert errors.frequency[:6].max() < family.errors.frequency[:6].max() < 1e-3
+    assert errors.mass < 1e-12
+
+
+def test_factors_of_the_mesh_are_above_zero(job):
+    with pytest.raises(JobError, match=r"body\.scale = .*: expected three factors above 0"):
+        read_job(job, {"length": 0})
 
 
 def test_modes_that_cross_the_cutoff_are_refused(job):
