@@ -81,7 +81,8 @@ def test_devices_are_not_read():
 def test_names_and_choices_are_shortened():
     assert len(quoted("x" * 1000)) == 80
     assert quoted("rod") == "'rod'"
-    assert quoted(np.eye(2)) == "array([[1., 0.], ..."
+    with np.printoptions(legacy=False):  # some packages change it when they are imported
+        assert quoted(np.eye(2)) == "array([[1., 0.], ..."
     assert quoted(10**5000) == "<int>"
     assert len(nearest("x" * 10**6, [f"{k:0500d}" for k in range(1000)])) < 4000
     assert nearest("rid", ["rod", "bob"]) == "; did you mean 'rod'? choices: bob, rod"
