@@ -1,8 +1,9 @@
 """Tables of the system file for bodies: [bodies.NAME]."""
 
 import logging
+from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
@@ -10,6 +11,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from cms.body.modal_file.file import convert_units, read
 from cms.body.reduced_body import ReducedBody
 from cms.errors import CmsError
+from fe_models.foundation.paths import file_digest
 from fe_models.foundation.toml_file import Matrix3, Table, Vector3, existing_file
 from fe_models.foundation.units import Units
 from floatframe.errors import ModelError
@@ -22,6 +24,9 @@ from floatframe.model.bodies.mode_choice import frozen_to_rigid, with_modes, wit
 from floatframe.model.bodies.rigid_body import RigidBody
 from floatframe.model.rotations import euler_parameters_of_rotation_vector
 from floatframe.model.system import Body
+
+if TYPE_CHECKING:
+    from cms.reduction.parametric.parametric_body import ParametricBody
 
 __all__ = ["BodySection", "body_of"]
 
@@ -167,9 +172,15 @@ def reduced_of(section: BodySection) -> ReducedBody:
     assert section.file is not None  # ensured by the caller
     if section.at is None:
         return read(section.file)
+    return family_of(section.file, file_digest(section.file)).at(**section.at)
+
+
+@lru_cache(maxsize=2)  # the points of a sweep read one family and align its modes once
+def family_of(file: Path, digest: str) -> "ParametricBody":
+    """Return the parametric body in a file; `digest` is that of the file, which may change."""
     from cms.reduction.parametric.family_file import read_parametric_body
 
-    return read_parametric_body(section.file).at(**section.at)
+    return read_parametric_body(file)
 
 
 def rigid_mass(section: BodySection) -> MassProperties:

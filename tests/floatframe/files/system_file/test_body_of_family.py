@@ -57,3 +57,16 @@ def test_a_sweep_changes_the_parameter_of_the_family_by_its_key_path(family):
     assert_array_equal(system.body("arm").reduced.interface("end").position, [1.05 / 2, 0, 0])
     with pytest.raises((ModelError, SystemFileError), match=r"bodies\.arm\.file: .* length = 1\.3: outside"):
         read_system(path, {"bodies.arm.at.length": 1.3})
+
+
+def test_a_family_that_has_changed_is_read_again(family):
+    path, arms = family
+    first = read_system(path)[0].body("arm").reduced
+    other = parametric_body({"length": (1.0, 1.3)}, [arms.samples[0], reduced(1.3)])
+    write_parametric_body(other, path.with_name("arms.h5"))
+    try:
+        again = read_system(path)[0].body("arm").reduced
+    finally:
+        write_parametric_body(arms, path.with_name("arms.h5"))
+    assert_array_equal(again.K, other.at(length=1.1).K)
+    assert abs(again.K - first.K).max() > 0
