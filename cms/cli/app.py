@@ -361,7 +361,9 @@ def check_command(
 @guarded
 def accept_command(
     file: ModalFile,
-    full: Annotated[Path | None, typer.Option("--full", help="Job file of the full model to compare with.")] = None,
+    full: Annotated[
+        Path | None, typer.Option("--job", "--full", help="Job file of the full model to compare with.")
+    ] = None,
     deck: Annotated[
         Path | None, typer.Option(help="Or its deck: Abaqus, CalculiX (.inp), Nastran (.bdf), ANSYS (.cdb).")
     ] = None,
@@ -389,7 +391,7 @@ def accept_command(
     that were left out. Exit code 0: accepted, 1: not accepted. Without -o: rod.h5 gives rod_acceptance.pdf; a PDF needs
     the extra pdf.
 
-    Example: cms accept rod.h5 --full rod.toml -o acceptance.pdf -o acceptance.json
+    Example: cms accept rod.h5 --job rod.toml -o acceptance.pdf -o acceptance.json
 
     Example: cms accept received.h5 --deck model.bdf --density steel=7.85e-9 -o acceptance.html
     """

@@ -198,13 +198,13 @@ def stiffening_words(record: Any) -> str:
 def numbering_rows(record: Any) -> list[tuple[str, str]]:
     """Return the ranges of the user's numbers, and the points with rotations, as table rows."""
     rows = []
-    for what in ("nodes", "elements"):
-        found = record[what]
+    for what in ("node", "element"):
+        found = record[f"{what}s"]
         words = "not on record: told by index" if found is None else (
             f"{found['count']}, from {found['from']} to {found['to']}"
         )  # fmt: skip
-        if what == "nodes" or found is not None:
-            rows.append((f"{what} of the mesh", words))
+        if what == "node" or found is not None:
+            rows.append((f"{what} numbers", words))
     if record["instances"]:
         rows.append(("instances", ", ".join(record["instances"])))
     if points := record["points_with_rotations"]:

@@ -120,8 +120,8 @@ def mobility_record(system: System) -> QualityRecord:
         return record("mobility", "Mobility", "fail", str(error))
     words = (
         f"{found.n_freedoms} independent motions: {found.n_bodies} bodies with {found.n_modes} modes minus "
-        f"{found.n_constraints} constraints; {found.mobility} if all bodies were rigid (count of Gruebler "
-        f"{found.gruebler})"
+        f"{found.n_constraints} constraints; {found.mobility} if all bodies were rigid (Gruebler's "
+        f"count: {found.gruebler})"
     )
     words += redundant_words(found)
     shares = system.redundant == "minimum-norm"
@@ -268,9 +268,9 @@ def step_record(system: System, found: SystemVibrations, h: float, *, has_fixed_
     steps = 1 / (h * f)
     followed, unseen = int((steps >= FOLLOWED * (1 - 1e-9)).sum()), int((steps < SEEN).sum())
     words = (
-        f"h = {h:g} {second} follows {followed} of {len(f)} vibrations with {FOLLOWED:g} steps in a period or more"
-        f"{f', and sees nothing of {unseen}' if unseen else ''}; h = {1 / (FOLLOWED * f[0]):.2g} follows the slowest, "
-        f"h = {1 / (FOLLOWED * f[-1]):.2g} all"
+        f"h = {h:g} {second} resolves {followed} of {len(f)} vibrations ({FOLLOWED:g} steps per period)"
+        f"{f'; {unseen} have less than {SEEN:g} steps per period' if unseen else ''}; the slowest needs "
+        f"h = {1 / (FOLLOWED * f[0]):.2g} {second}, the fastest {1 / (FOLLOWED * f[-1]):.2g} {second}"
     )
     if not has_fixed_steps:
         words += "; the method takes shorter steps where its tolerance requires it"

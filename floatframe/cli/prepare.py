@@ -42,7 +42,7 @@ def example_command(
     folder = output or Path(name)
     for path in copy_machine(name, folder):
         say(f"{path}")
-    say(f"its README.md lists the commands in order: {folder / 'README.md'}")
+    say("its README.md lists the commands in order")
 
 
 # prepare --------------------------------------------------------------------------------------------------------------

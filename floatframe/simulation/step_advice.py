@@ -49,10 +49,10 @@ class StepAdvice:
     def words(self) -> str:
         """Return one sentence on the modes that the step size resolves, and on the step sizes that resolve more."""
         return (
-            f"h = {self.h:.3g} follows {self.n_followed} of {self.n_modes} modes ({FOLLOWED:g} steps in a period); the "
+            f"h = {self.h:.3g} resolves {self.n_followed} of {self.n_modes} modes ({FOLLOWED:g} steps per period); the "
             f"fastest, mode {self.fastest_mode} of body {self.fastest_body!r}, has {1 / (self.h * self.fastest):.2g} "
-            f"steps in its period of {1 / self.fastest:.3g}: h = {self.h_slowest:.2g} follows the slowest mode, "
-            f"h = {self.h_fastest:.2g} all of them"
+            f"steps in its period of {1 / self.fastest:.3g}: the slowest mode needs h = {self.h_slowest:.2g}, "
+            f"the fastest {self.h_fastest:.2g}"
         )
 
 

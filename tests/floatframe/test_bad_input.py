@@ -141,18 +141,18 @@ def test_what_a_step_size_follows_of_the_modes_is_said_in_numbers():
     assert (advice.n_modes, advice.n_followed, advice.n_unseen) == (3, 2, 1)
     np.testing.assert_allclose([advice.slowest, advice.fastest], [5.0, 1000.0], rtol=1e-12)
     np.testing.assert_allclose([advice.h_slowest, advice.h_fastest], [1 / 100, 1 / 20000], rtol=1e-12)
-    assert "follows 2 of 3 modes" in advice.words
-    assert "mode 3 of body 'rod', has 1 steps in its period of 0.001: h = 0.01 follows the slowest mode" in advice.words
+    assert "resolves 2 of 3 modes" in advice.words
+    assert "mode 3 of body 'rod', has 1 steps in its period of 0.001: the slowest mode needs h = 0.01" in advice.words
     assert step_advice(slider_crank(), 1e-3) is None
 
 
 def test_a_step_size_that_follows_no_mode_is_noted_and_one_that_fails_is_advised(caplog):
     integrate(vibrating(), GeneralizedAlpha(), 0.1, 0.05)
-    assert "h = 0.05 follows 0 of 3 modes" in caplog.text
+    assert "h = 0.05 resolves 0 of 3 modes" in caplog.text
     caplog.clear()
     integrate(vibrating(), GeneralizedAlpha(), 0.01, 0.005)
     assert "follows" not in caplog.text
-    with pytest.raises(ConvergenceError, match=r"h = 0.5 follows 0 of 3 modes .* h = 0.01 follows the slowest mode"):
+    with pytest.raises(ConvergenceError, match=r"h = 0.5 resolves 0 of 3 modes .* the slowest mode needs h = 0.01"):
         integrate(vibrating(), GeneralizedAlpha(max_iterations=2), 1.0, 0.5)
 
 

@@ -137,9 +137,9 @@ def run_accept(request: AcceptRequest) -> int:
         option = "--program" if request.program else "--density"
         raise QualityError(f"{option}: says how a deck is read; give the deck with --deck")
     if request.changes and request.full is None:
-        raise QualityError("--set: changes parameters of the job; give it with --full")
+        raise QualityError("--set: changes parameters of the job; give it with --job")
     if request.full is not None and request.deck is not None:
-        raise QualityError("--full and --deck: expected one full model, got two")
+        raise QualityError("--job and --deck: expected one full model, got two")
     wanted = request.outputs or (request.file.with_name(f"{request.file.stem}_acceptance.pdf"),)
     inputs = [path for path in (request.file, request.full, request.deck) if path is not None]
     targets = [output_path(path, "", QualityError, overwrite_of=inputs) for path in wanted]

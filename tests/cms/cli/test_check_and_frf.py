@@ -98,7 +98,7 @@ def test_the_file_of_another_job_fails(folder):
         (["check", "bar.h5", "--band", "1000"], ["--band", "--job"]),
         (["check", "bar.h5", "--set", "n=1"], ["--set", "--job"]),
         (["check", "bar.h5", "--job", "bar.toml", "--set", "n=1"], ["there is no parameter 'n'"]),
-        (["accept", "bar.h5", "--set", "n=1"], ["--set", "--full"]),
+        (["accept", "bar.h5", "--set", "n=1"], ["--set", "--job"]),
         (["accept", "bar.h5", "--full", "bar.toml", "-o", "a.json", "--set", "n=1"], ["there is no parameter 'n'"]),
         (["compare", "bar.toml", "--set", "n=1"], ["there is no parameter 'n'"]),
         (["modes", "bar.toml", "--set", "n=1"], ["there is no parameter 'n'"]),

@@ -121,14 +121,14 @@ def test_the_record_names_mobility_velocities_and_the_step_that_follows_the_vibr
     period = 2 * np.pi / np.sqrt(STIFFNESS / MASS)
     assert f"from {1 / period:.4g} Hz" in records["vibrations"]["reason"]
     assert_allclose(records["step"]["value"], period / 1e-3, rtol=1e-9)
-    assert f"h = {period / 20 / second:.2g} follows the slowest" in records["step"]["reason"]
+    assert f"the slowest needs h = {period / 20 / second:.2g}" in records["step"]["reason"]
     assert records["step"]["verdict"] == "pass"
 
 
 @pytest.mark.parametrize(
     ("setting", "name", "verdict", "words"),
     [
-        ("run.h=0.02", "step", "warn", "follows 0 of 1 vibrations"),
+        ("run.h=0.02", "step", "warn", "resolves 0 of 1 vibrations"),
         (
             f"bodies.sledge.position={(TURN.apply([150.0, 40.0, 90.0]) + OFFSET).tolist()}",
             "placement",

@@ -112,7 +112,7 @@ def stick():
 def errors(made, exact, h, rhos, refused=frozenset()):
     """Return the error of the angle at the end by formulation and rho_inf, of those that are not refused in words."""
     for formulation, rho in refused:
-        with pytest.raises(ff.errors.ConvergenceError, match=r"h = 0\.022 follows 0 of 8 modes"):
+        with pytest.raises(ff.errors.ConvergenceError, match=r"h = 0\.022 resolves 0 of 8 modes"):
             run(made, rho, h, formulation)
     return {
         (formulation, rho): abs(angles(made, run(made, rho, h, formulation))[-1] / exact - 1)

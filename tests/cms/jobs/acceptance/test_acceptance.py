@@ -253,7 +253,7 @@ def test_command_writes_judges_and_refuses(folder, tmp_path, capsys, monkeypatch
     assert re.search(r"written as .pdf, .html, .json; got .docx", capsys.readouterr().err)
     assert run(monkeypatch, [*arguments, "--density", "steel=1"]) == 2
     assert "--deck" in capsys.readouterr().err
-    assert run(monkeypatch, [*arguments, "--full", "a.toml", "--deck", "b.inp"]) == 2
+    assert run(monkeypatch, [*arguments, "--job", "a.toml", "--deck", "b.inp"]) == 2
     assert "got two" in capsys.readouterr().err
     assert run(monkeypatch, [*arguments, "--strict", "--full", str(folder / "bar.toml"), "--band", "60000"]) == 1
     assert "reservations" in capsys.readouterr().out or json.loads(target.read_text())["verdict"] == "fail"
