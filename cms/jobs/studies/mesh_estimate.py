@@ -96,7 +96,7 @@ def draw_oversize(estimate: MeshEstimate, error: float, path: Path) -> Drawing:
         captions=(
             f"largest error of {len(estimate.frequencies)} frequencies: {100 * estimate.worst:.2g} %, "
             f"wanted: {100 * error:.2g} %",
-            "element size over the size for the wanted error: above 1 too coarse, below 1 finer than necessary",
+            "element size over the size for the wanted error, if stress is smooth: above 1 too coarse, below 1 finer",
         ),
         scalar_title="size over wanted size",
         direction=direction,
