@@ -38,6 +38,7 @@ from cms.body.error_estimates import ErrorEstimates
 from cms.errors import BodyError
 from cms.linear_algebra.independent import Products
 from cms.modes.families.families import Families
+from cms.modes.families.receptance import boundary_scale
 from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.free_basis import FreeBasis
 from cms.reduction.mesh_error import mesh_errors
@@ -58,7 +59,7 @@ NO_ENERGY = 1e-24  #: strain energy of a response relative to the largest of its
 STATIC_ROUNDING = 1e-5  #: error of a static response, below which it is rounding
 MOST_LOADS, SUMS = 120, 12  #: largest number of unit loads that are judged one by one, else number of sums
 RESPONSE_ROUNDING = 1e-7  #: error of a frequency response, below which it is rounding
-DAMPING = 0.01  #: damping ratio of every mode in frequency responses
+DAMPING = 0.01  #: damping ratio of every mode in compared frequency responses
 LOWEST = 0.05  #: lowest frequency of a response divided by the first elastic one; below it the body moves rigidly
 POINTS = 33  #: number of frequencies around each mode at which responses are compared
 METHOD = (
@@ -165,8 +166,8 @@ def enlarged_space(
     K_E = products.K @ E
     bound = np.sqrt(np.maximum(dots(E, K_E), 0.0) / theta)  # (1)
     subtract(E, V, inner(V, K_E) / omega2[:, None])  # rounding
-    X = [E[:, bound > EXACT], independent_part(basis, products, U[:, n:])]
-    return ritz_shapes(basis, np.hstack([*X, *random_columns(families, basis, products)]), products, bound, directions)
+    X = [E[:, bound > EXACT], independent_part(basis, products, U[:, n:]), *random_columns(families, basis, products)]
+    return EnlargedSpace(bound, *ritz_shapes(basis, np.hstack(X), products, directions))
 
 
 def errors_of_modes(basis: FreeBasis, space: EnlargedSpace) -> FrequencyErrors:
@@ -201,8 +202,8 @@ def independent_part(basis: FreeBasis, products: Products, X: Array) -> Array:
     return X[:, dots(X, K_X) > EXACT**2 * before]
 
 
-def ritz_shapes(basis: FreeBasis, X: Array, products: Products, bound: Array, directions: Array) -> EnlargedSpace:
-    """Apply the Rayleigh-Ritz method to the span of V and X, where VᵀKX = 0."""
+def ritz_shapes(basis: FreeBasis, X: Array, products: Products, directions: Array) -> tuple[Array, Array, Array]:
+    """Return mu, Y and motion of `EnlargedSpace` by the Rayleigh-Ritz method in the span of V and X, VᵀKX = 0."""
     omega = np.sqrt(basis.omega2)
     K_X = products.K @ X
     size = 1 / np.sqrt(np.maximum(dots(X, K_X), np.finfo(float).tiny))
@@ -215,7 +216,7 @@ def ritz_shapes(basis: FreeBasis, X: Array, products: Products, bound: Array, di
     mu, Y = la.eigh(mass)
     mu, Y = np.maximum(mu[::-1], 0.0), Y[:, ::-1]
     motion = np.hstack([inner(directions, basis.Phi) / omega, inner(directions, X) @ T]) @ Y
-    return EnlargedSpace(bound, mu, Y[: len(omega)], motion)
+    return mu, Y[: len(omega)], motion
 
 
 def static_factors(basis: FreeBasis) -> Array:
@@ -234,13 +235,15 @@ def response_loads(body: FEBody) -> Array:
     ndarray
         (n_dof, n_loads).
     """
-    size = np.where(body.dofs[body.b, 1] < 3, 1.0, body.length)
-    sums = np.eye(len(size))
-    if len(size) > SUMS:
-        sums = np.random.default_rng(SEED).choice([-1.0, 1.0], (len(size), SUMS))
-    loads = np.zeros((body.n_dof, sums.shape[1]))
-    loads[body.b] = size[:, None] * sums
+    at_b = boundary_scale(body)[:, None] * unit_loads(len(body.b), SUMS)
+    loads = np.zeros((body.n_dof, at_b.shape[1]))
+    loads[body.b] = at_b
     return loads
+
+
+def unit_loads(n: int, most: int) -> Array:
+    """Return unit loads as columns, (n, n), or if they are more than `most`, sums with random signs, (n, SUMS)."""
+    return np.eye(n) if n <= most else np.random.default_rng(SEED).choice([-1.0, 1.0], (n, SUMS))
 
 
 def response_errors(basis: FreeBasis, space: EnlargedSpace, directions: Array) -> Array:
@@ -299,10 +302,9 @@ def interface_errors(families: Families, basis: FreeBasis) -> tuple[tuple[str, .
     If there are very many of them, random sums of unit loads take their places.
     """
     free = families.free
-    labels, loads = families.held_names("load")[0], np.eye(len(free.e))
+    labels, loads = families.held_names("load")[0], unit_loads(len(free.e), MOST_LOADS)
     names = tuple(labels[k] for k in free.e)
     if len(names) > MOST_LOADS:
-        loads = np.random.default_rng(SEED).choice([-1.0, 1.0], (len(names), SUMS))
         names = tuple(f"sum {k + 1} of all unit loads, with random signs" for k in range(SUMS))
     z = np.zeros((len(families.h), len(names)))
     z[free.e] = free.solve_boundary(loads)

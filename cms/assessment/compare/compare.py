@@ -20,13 +20,13 @@ from cms.assessment.compare.pulse import default_pulse
 from cms.assessment.compare.reference import Question, full_results, reference_of, solution
 from cms.assessment.compare.set_result import SetPart, counts_of_parts, joined_parts, set_part, set_result
 from cms.assessment.compare.verdicts import answer, ranking
-from cms.assessment.quality.of_reduction.frf import DAMPING
 from cms.assessment.quality.reference.ports import Ports
 from cms.assessment.quality.reference.transient import Snapshots
 from cms.assessment.rendering.shape import surface_edges
 from cms.errors import CompareError
 from cms.modes.families.families import Families
 from cms.modes.mode_sets import MODE_SETS
+from cms.reduction.error_estimates import DAMPING
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.ranks.spread_matrix import whole_matrix

@@ -12,7 +12,7 @@ import numpy as np
 from cms.assessment.compare.coordinates import ReferenceBasis
 from cms.assessment.compare.free_shapes import judged_subset
 from cms.assessment.compare.subsets import SUBSETS
-from cms.assessment.quality.of_reduction.frf import DAMPING, LOWEST, compare_responses, frequency_grid
+from cms.assessment.quality.of_reduction.frf import compare_responses, frequency_grid
 from cms.assessment.quality.reference.full_reference import FullReference
 from cms.assessment.quality.reference.port_model import PortModel, modal_response
 from cms.errors import ModeSetError
@@ -20,7 +20,7 @@ from cms.modes.families.families import Families, families_of
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets import MODE_SETS
 from cms.reduction.basis.free_basis import FreeBasis, free_basis
-from cms.reduction.error_estimates import frequency_errors
+from cms.reduction.error_estimates import DAMPING, LOWEST, frequency_errors
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented

@@ -17,11 +17,12 @@ from cms.assessment.compare.full_model import (
     write_full_model,
 )
 from cms.assessment.compare.pulse import Pulse
-from cms.assessment.quality.of_reduction.frf import LOWEST, frequency_grid
+from cms.assessment.quality.of_reduction.frf import frequency_grid
 from cms.assessment.quality.reference.port_model import modal_response
 from cms.assessment.quality.reference.transient import Snapshots
 from cms.errors import CompareError
 from cms.modes.families.families import Families
+from cms.reduction.error_estimates import LOWEST
 
 __all__ = ["Question", "Solution", "full_results", "reference_of", "solution"]
 

@@ -9,6 +9,7 @@ from cms.assessment.quality.record import QualityRecord, judge
 from cms.assessment.quality.reference.full_reference import FullReference
 from cms.assessment.quality.reference.port_model import FrequencyResponse, PortModel, modal_response
 from cms.reduction.basis.free_basis import FreeBasis
+from cms.reduction.error_estimates import DAMPING, LOWEST
 from fe_models.foundation.arrays import Array, frozen
 
 __all__ = [
@@ -22,13 +23,11 @@ __all__ = [
     "response_record",
 ]
 
-DAMPING = 0.01  #: damping ratio of every mode in the compared responses of full and reduced model
 MOST_POINTS = 1_000_000  #: largest number of frequencies of a response
 POINTS = 400
 #: distances of added points from a resonance, in half bandwidths
 AROUND = np.array([0.0, 0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0, 8.0, 12.0])
 UNDAMPED = 1e-4  #: relative frequency distance of points around an undamped resonance, whose peak is infinite
-LOWEST = 0.05  #: lower end of the band divided by the first elastic frequency; below it the body moves rigidly
 
 
 @dataclass(frozen=True, eq=False)
