@@ -75,8 +75,8 @@ def cayley(theta):
 
 @loops
 def center(types, t, n, q, C):
-    """Return the centre of mass s(q)/m in the body; write its derivative by q, 1C(q)/m, into C, (3 n,)."""
-    s, f = shape_moments(types, t, n, q, C), 1.0 / types.mass[t]
+    """Return the centre of mass s(q)/m in the body; write its derivative by q, 1C(q)/m, into the first 3 n of C."""
+    s, f = shape_moments(types, t, n, q, C[: 3 * n]), 1.0 / types.mass[t]
     for k in range(3 * n):
         C[k] *= f
     return scaled(f, s)
