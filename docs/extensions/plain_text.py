@@ -1,6 +1,7 @@
 """Conversion of text written for readers of the source into text for the site.
 
-Names of pages in code marks become links to them, in pages and in docstrings. Docstrings hold plain formulas
+Names of pages in code marks become links to them, in pages and in docstrings. The remark with the name of a file before
+a block of code becomes its caption. Docstrings hold plain formulas
 (`|x|`, `q_`, `a*b`), in which reStructuredText would see marks of its own: those are escaped.
 """
 
@@ -12,6 +13,7 @@ from sphinx.application import Sphinx
 
 PAGE = re.compile(r"`(?:docs/)?(\w+)\.md`")
 SECTION = re.compile(r"(?:docs/)?(\w+)\.md")
+FILE = re.compile(r"^<!-- (?:file: )?([\w/]+\.\w+) -->\n```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 MARKS = re.compile(r"(?<!\\)([*|])|(?<=\w)_(?=[^\w]|$)")
 
 
@@ -26,6 +28,11 @@ def pages_linked(app: Sphinx, docname: str, content: list[str]) -> None:
 
     if not docname.startswith(("api/", "notebooks/")):
         content[0] = PAGE.sub(link, content[0])
+
+
+def files_named(app: Sphinx, docname: str, content: list[str]) -> None:
+    """Show the name of the file above a block of code that a reader saves."""
+    content[0] = FILE.sub(r"```{code-block} \2\n:caption: \1\n\n\3```", content[0])
 
 
 def docstring_escaped(app: Sphinx, what: str, name: str, thing: object, options: object, lines: list[str]) -> None:
@@ -43,5 +50,6 @@ def docstring_escaped(app: Sphinx, what: str, name: str, thing: object, options:
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the handlers for reading pages and, after numpydoc, docstrings."""
     app.connect("source-read", pages_linked, priority=600)
+    app.connect("source-read", files_named, priority=600)
     app.connect("autodoc-process-docstring", docstring_escaped, priority=600)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

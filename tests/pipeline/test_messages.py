@@ -133,3 +133,4 @@ def test_a_short_option_has_one_meaning_in_both_programs():
                     if word.startswith("-") and not word.startswith("--"):
                         meanings[word].add(long)
     assert {word: long for word, long in meanings.items() if len(long) > 1} == {}
+    assert {"-o", "-j"} <= set(meanings)

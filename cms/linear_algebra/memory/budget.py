@@ -13,7 +13,8 @@ If (3) does not fit, the columns are put on disk (`fe_models.foundation.tall`). 
 
 (3') memory of the coupled body + 54 matrices (c, c) + 400 MB of products
 
-The numbers 3 m + 6 b, 6.2, 54 and 400 MB are measured (docs/memory.md); all others follow from array shapes.
+The numbers 3 m + 6 b, 6.2, 54 and 400 MB are measured; all others follow from array shapes. docs/measured.md compares
+forecasts with peaks.
 """
 
 import logging

@@ -18,7 +18,7 @@ MANY = 50_000  #: number of rows above which the duration is estimated
 LONG = 30.0  #: duration in seconds above which a warning is given before the work
 #: operations per second (4.6e9 to 4.8e9 measured: tet10 rod with 58 788 rows, grid with 32 768; one processor)
 OPERATIONS = 4e9
-BYTES = 48.0  #: memory per entry of the triangular factor while L and U are computed [bytes] (docs/memory.md)
+BYTES = 48.0  #: memory per entry of the triangular factor while L and U are computed [bytes]
 
 log = logging.getLogger(__name__)
 

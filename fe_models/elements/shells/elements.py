@@ -100,7 +100,7 @@ def _unit(v: Array) -> Array:
 
 CHUNK = 500  #: number of cells whose operators are in memory at a time
 LEAST_ANGLE = 5.0  #: smallest angle between the reference direction of a layup and the normal of a cell [degree]
-#: gamma of quads, relative to the shear modulus; docs/shells.md shows the error of larger and smaller values
+#: gamma of quads, relative to the shear modulus; docs/measured.md has the error of larger and smaller values
 DRILLING = 0.1
 #: contribution of the drilling rotations to the displacement of the sides
 DRILLING_SHARE = {"triangle": 1.0, "quad": 0.3}
