@@ -1,8 +1,8 @@
 """Conversion of text written for readers of the source into text for the site.
 
 Names of pages in code marks become links to them, in pages and in docstrings. The remark with the name of a file before
-a block of code becomes its caption. Docstrings hold plain formulas
-(`|x|`, `q_`, `a*b`), in which reStructuredText would see marks of its own: those are escaped.
+a block of code becomes its caption. Docstrings hold plain formulas (`|x|`, `q_`, `a*b`), in which reStructuredText
+would see marks of its own: those are escaped.
 """
 
 import re
@@ -32,7 +32,7 @@ def pages_linked(app: Sphinx, docname: str, content: list[str]) -> None:
 
 def files_named(app: Sphinx, docname: str, content: list[str]) -> None:
     """Show the name of the file above a block of code that a reader saves."""
-    content[0] = FILE.sub(r"```{code-block} \2\n:caption: \1\n\n\3```", content[0])
+    content[0] = FILE.sub(r'```{code-block} \2\n:caption: "`\1`"\n\n\3```', content[0])
 
 
 def docstring_escaped(app: Sphinx, what: str, name: str, thing: object, options: object, lines: list[str]) -> None:

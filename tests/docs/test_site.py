@@ -152,7 +152,7 @@ def test_a_block_of_code_that_a_reader_saves_shows_the_name_of_its_file():
     kept = "<!-- not run -->\n```python\nx = 1\n```\n"
     content = ["<!-- file: rubber/mounts.py -->\n```python\nx = 1\n```\n" + kept]
     plain_text.files_named(None, "page", content)
-    assert content == ["```{code-block} python\n:caption: rubber/mounts.py\n\nx = 1\n```\n" + kept]
+    assert content == ['```{code-block} python\n:caption: "`rubber/mounts.py`"\n\nx = 1\n```\n' + kept]
 
 
 def test_formulas_in_docstrings_are_escaped_and_pages_become_links(tmp_path):
