@@ -9,9 +9,8 @@ from cms.errors import JobError
 from cms.jobs.job import Job, read_job
 from cms.pipeline import reduce_job
 from cms.reduction.parametric.parametric_body import (
-    MOST_PARAMETERS,
-    MOST_VALUES,
     ParametricBody,
+    fault_of_values,
     middle_point,
     parametric_body,
     point_name,
@@ -19,7 +18,7 @@ from cms.reduction.parametric.parametric_body import (
 from fe_models.foundation.solver import Solver
 from fe_models.foundation.stages import Stages
 
-__all__ = ["reduce_family"]
+__all__ = ["job_at", "reduce_family"]
 
 
 def reduce_family(
@@ -57,25 +56,17 @@ def reduce_family(
     >>> cms.write(family.at(length=1.1), "rod_1100.h5")                                   # doctest: +SKIP
     """
     path, stages = Path(path), stages or Stages()
-    if not 1 <= len(over) <= MOST_PARAMETERS:
-        raise JobError(f"{path}: expected one to {MOST_PARAMETERS} parameters to vary, got {len(over)}")
-    for name, values in over.items():
-        if not 2 <= len(values) <= MOST_VALUES or list(values) != sorted(set(values)):
-            raise JobError(
-                f"{path}: {name}: expected two to {MOST_VALUES} ascending values, got "
-                f"{', '.join(f'{x:g}' for x in values)}"
-            )
-    points = [dict(zip(over, point, strict=True)) for point in product(*over.values())]
-    if any(len(values) == 2 for values in over.values()):
-        points.append(middle_point(over))
+    if fault := fault_of_values(over):
+        raise JobError(f"{path}: {fault}")
+    grid = [dict(zip(over, point, strict=True)) for point in product(*over.values())]
+    points = grid + ([middle_point(over)] if any(len(values) == 2 for values in over.values()) else [])
     jobs = [job_at(path, point) for point in points]  # wrong names and values are refused before the first reduction
     samples = []
     for point, job in zip(points, jobs, strict=True):
         with stages(point_name(point)):
             samples.append(reduce_job(job, solver=solver))
-    n = len(points) - any(len(values) == 2 for values in over.values())
     with stages("align and judge"):
-        return parametric_body(over, samples[:n], middle=samples[n] if n < len(samples) else None)
+        return parametric_body(over, samples[: len(grid)], middle=samples[-1] if len(points) > len(grid) else None)
 
 
 def job_at(path: str | os.PathLike[str], point: Mapping[str, float]) -> Job:

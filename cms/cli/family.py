@@ -40,15 +40,14 @@ def family_command(
 
     Example: cms family rod.toml --over length=1.0:1.2:3 --over thickness=0.008,0.01,0.012
     """
-    from cms.family import reduce_family
+    from cms.family import job_at, reduce_family
     from cms.fleet import inputs_of
-    from cms.jobs.job import read_job
     from cms.reduction.parametric.family_file import write_parametric_body
 
     values = values_of(over)
-    first = {name: float(given[0]) for name, given in values.items()}
+    first = {name: given[0] for name, given in values.items()}
     default = job.with_name(f"{job.stem}_family.h5")
-    path = output_path(output, default, JobError, overwrite_of=inputs_of(job, read_job(job, first)))
+    path = output_path(output, default, JobError, overwrite_of=inputs_of(job, job_at(job, first)))
     with stages() as clock:
         family = reduce_family(job, values, solver=solver, stages=clock)
         with clock("write"):
@@ -103,9 +102,6 @@ def interpolate_command(
     from cms.reduction.parametric.family_file import read_parametric_body
 
     point = changes_of(set_values)
-    for name, value in point.items():
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise JobError(f"--set {name}={value}: expected a number, such as {name}=1.1")
     path = output_path(output, file.with_name(f"{file.stem}_at.h5"), ModalFileError, overwrite_of=[file])
     body = read_parametric_body(file).at(**point)
     write(body, path)

@@ -53,8 +53,8 @@ def run_converge(request: ConvergeRequest, changes: Mapping[str, Any]) -> None:
     from cms.jobs.studies.mesh_convergence import mesh_convergence
     from cms.jobs.studies.mesh_estimate import draw_oversize
 
-    if not request.error > 0:
-        raise JobError(f"converge: error: expected a number above 0, got {request.error:g}")
+    if not 0 < request.error < np.inf:
+        raise JobError(f"converge: --error {request.error:g}: expected a number above 0")
     if request.output is not None:
         output_file(request.output, request.output, (".png",), JobError, overwrite_of=(request.path,), needs_file=True)
     job = read_job(request.path, changes)
@@ -93,8 +93,9 @@ def estimate_of_job(job: "Job", n_modes: int, clock: "Stages") -> "MeshEstimate"
         estimate = mesh_estimate(body, n_modes)
     if estimate.errors.of_cells is None:
         raise JobError(
-            f"converge: the body has one mesh, whose error is {estimate.errors.method}; expected a solid, a shell, or "
-            "a CAD file with [mesh_size]"
+            "converge: the error of the mesh is not known: "
+            f"{estimate.errors.method.removeprefix('none: ')}; expected a solid, a shell, or a CAD file with "
+            "[mesh_size]"
         )
     return estimate
 

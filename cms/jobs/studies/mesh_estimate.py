@@ -17,7 +17,6 @@ from cms.modes.families.families import Families
 from cms.modes.mode_sets.free_interface import normal_modes
 from cms.reduction.basis.free_basis import free_basis
 from cms.reduction.mesh_error import MeshErrors, mesh_errors
-from cms.reduction.reduction import reduce
 from fe_models.body.fe_body import FEBody
 from fe_models.elements.recovery.mesh_error import powers_of_size, surface_elements
 from fe_models.foundation.arrays import Array
@@ -69,11 +68,10 @@ def mesh_estimate(body: FEBody, n_modes: int) -> MeshEstimate:
     bare = replace(body, load_cases=())
     with Families(bare) as families:
         modes = normal_modes(families, n_modes)
-        reduced = reduce(families, modes, stress=False, geometric=False, errors=False)
         basis = free_basis(bare, modes, families)
-        n = min(n_modes, len(basis.frequencies()))
-        errors = mesh_errors(bare, basis, n)
-    return MeshEstimate(body, np.asarray(reduced.free_frequencies[:n] / body.units.time), errors)
+        frequencies = basis.frequencies(body.units.time)[:n_modes]
+        errors = mesh_errors(bare, basis, len(frequencies))
+    return MeshEstimate(body, frequencies, errors)
 
 
 def draw_oversize(estimate: MeshEstimate, error: float, path: Path) -> Drawing:

@@ -53,9 +53,9 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import Summary, presented
 from fe_models.foundation.records import FrozenMapping, checked_fields
-from fe_models.foundation.words import nearest, quoted
+from fe_models.foundation.words import nearest, quoted, shortened
 
-__all__ = ["MOST_PARAMETERS", "MOST_VALUES", "ParametricBody", "parametric_body", "point_name"]
+__all__ = ["ParametricBody", "fault_of_values", "middle_point", "parametric_body", "point_name"]
 
 MOST_PARAMETERS = 3
 MOST_VALUES = 7  #: values of a parameter; polynomials through more equidistant values oscillate
@@ -101,14 +101,8 @@ class ParametricBody:
         checked = {name: tuple(float(x) for x in given) for name, given in self.values.items()}
         object.__setattr__(self, "values", FrozenMapping(checked))
         object.__setattr__(self, "samples", tuple(self.samples))
-        if not 1 <= len(checked) <= MOST_PARAMETERS:
-            raise BodyError(f"parametric body: expected one to {MOST_PARAMETERS} parameters, got {len(checked)}")
-        for name, given in checked.items():
-            if not 2 <= len(given) <= MOST_VALUES or not all(np.isfinite(given)) or not all(np.diff(given) > 0):
-                raise BodyError(
-                    f"parametric body: {name}: expected two to {MOST_VALUES} ascending values, got "
-                    f"{', '.join(f'{x:g}' for x in given)}"
-                )
+        if fault := fault_of_values(checked):
+            raise BodyError(f"parametric body: {fault}")
         n = int(np.prod([len(given) for given in checked.values()]))
         if len(self.samples) != n:
             raise BodyError(f"parametric body: expected {n} samples, one at each point, got {len(self.samples)}")
@@ -184,13 +178,17 @@ class ParametricBody:
                 raise BodyError(
                     f"parametric body: {name}: missing; expected a value from {given[0]:g} to {given[-1]:g}"
                 )
-            x, margin = float(parameters[name]), ROUNDING * (given[-1] - given[0])
+            x, margin = parameters[name], ROUNDING * (given[-1] - given[0])
+            if isinstance(x, bool) or not isinstance(x, int | float | np.number):
+                raise BodyError(
+                    f"parametric body: {name} = {quoted(x)}: expected a number from {given[0]:g} to {given[-1]:g}"
+                )
             if not given[0] - margin <= x <= given[-1] + margin:
                 raise BodyError(
                     f"parametric body: {name} = {x:g}: outside of the sampled range from {given[0]:g} to "
                     f"{given[-1]:g}; a body is interpolated, not extrapolated. Take samples of a larger range"
                 )
-            point[name] = min(max(x, given[0]), given[-1])
+            point[name] = min(max(float(x), given[0]), given[-1])
         return point
 
     def _closest(self, point: Mapping[str, float]) -> int:
@@ -274,6 +272,17 @@ def parametric_body(
         parts.append(errors_between(body, middle))
         methods.append(f"a reduction at {point_name(point)}")
     return replace(made, errors=replace(sum_of_errors(parts), method=" and ".join(methods)))
+
+
+def fault_of_values(values: Mapping[str, Sequence[float]]) -> str:
+    """Return what is wrong with the sampled values of the parameters; "" if nothing is."""
+    if not 1 <= len(values) <= MOST_PARAMETERS:
+        return f"expected one to {MOST_PARAMETERS} parameters, got {len(values)}"
+    for name, given in values.items():
+        if not 2 <= len(given) <= MOST_VALUES or not np.isfinite(given).all() or not (np.diff(given) > 0).all():
+            got = shortened(", ".join(f"{x:g}" for x in given))
+            return f"{name}: expected two to {MOST_VALUES} ascending values, got {got}"
+    return ""
 
 
 def middle_point(values: Mapping[str, Sequence[float]]) -> dict[str, float]:

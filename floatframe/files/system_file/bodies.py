@@ -141,7 +141,7 @@ def body_of(name: str, section: BodySection, files: dict[Any, ReducedBody], unit
         return RigidBody(name, **rigid_mass(section).arguments, **motion)
     if source_key(section) not in files:
         try:
-            reduced = reduced_of(section)
+            reduced = reduced_of(name, section)
             files[source_key(section)] = convert_units(reduced, units)
         except CmsError as error:
             raise ModelError(f"bodies.{name}.file: {error}") from error
@@ -167,12 +167,16 @@ def source_key(section: BodySection) -> Any:
     return section.file if section.at is None else (section.file, repr(sorted(section.at.items())))
 
 
-def reduced_of(section: BodySection) -> ReducedBody:
+def reduced_of(name: str, section: BodySection) -> ReducedBody:
     """Return the body of the modal file, or of the family at its parameters."""
     assert section.file is not None  # ensured by the caller
     if section.at is None:
         return read(section.file)
-    return family_of(section.file, file_digest(section.file)).at(**section.at)
+    family = family_of(section.file, file_digest(section.file))
+    try:
+        return family.at(**section.at)
+    except CmsError as error:
+        raise ModelError(f"bodies.{name}.at: {error}") from error
 
 
 @lru_cache(maxsize=2)  # the points of a sweep read one family and align its modes once

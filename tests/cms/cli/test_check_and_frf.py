@@ -15,7 +15,7 @@ from cms.jobs.job import read_job
 from cms.pipeline import reduce_job
 from fe_models.files import read_table
 from tests.bodies import box_mesh
-from tests.cms.command import run_cms
+from tests.cms.command import assert_refused, run_cms
 from tests.decks import JOB, write_deck
 
 FRF = ("--from", "left", "--to", "right", "--band", "100:30000:60")
@@ -38,14 +38,6 @@ def folder(tmp_path_factory):
         JOB.replace("mm-t-s", "mm-kg-ms").replace("210000", "210").replace("7.85e-9", "7.85e-6")
     )
     return folder
-
-
-def assert_refused(result, *words):
-    assert result.exit_code == 2, result.output
-    assert result.stderr.count("error: ") == 1
-    assert "Traceback" not in result.output
-    for word in words:
-        assert word in result.stderr
 
 
 def test_a_good_file_passes_with_exit_code_0(folder):
@@ -103,6 +95,8 @@ def test_the_file_of_another_job_fails(folder):
         (["compare", "bar.toml", "--set", "n=1"], ["there is no parameter 'n'"]),
         (["modes", "bar.toml", "--set", "n=1"], ["there is no parameter 'n'"]),
         (["converge", "bar.toml", "--set", "n=1"], ["there is no parameter 'n'"]),
+        (["converge", "bar.toml", "--error", "inf"], ["--error inf: expected a number above 0"]),
+        (["converge", "bar.toml", "--error", "nan"], ["--error nan: expected a number above 0"]),
         (["frf", "bar.h5", *FRF, "--set", "n=1"], ["--set", "--job"]),
         (["frf", "bar.h5", *FRF, "--job", "bar.toml", "--set", "n=1"], ["there is no parameter 'n'"]),
         (["check", "bar.h5", "--job", "nothing.toml"], ["nothing.toml"]),

@@ -13,6 +13,7 @@ from cms.reduction import convert_frame, parametric_body, read_parametric_body, 
 from cms.reduction.parametric.alignment import align, recombined
 from cms.reduction.parametric.interpolation_errors import errors_between
 from fe_models.meshes.numbering import Numbering
+from tests.cms.command import assert_refused, run_cms
 
 LENGTHS = (1.0, 1.2)
 THICKNESSES = (0.012, 0.017, 0.024)  #: bending in both planes crosses at the width
@@ -157,6 +158,11 @@ def test_values_outside_and_other_names_are_refused(lengths):
         lengths.at(lenght=1.1)
     with pytest.raises(BodyError, match=r"length: missing; expected a value from 1 to 1\.2"):
         lengths.at()
+    with pytest.raises(BodyError, match=r"length = nan: outside of the sampled range"):
+        lengths.at(length=np.nan)
+    for value in ("1.1", True, None):
+        with pytest.raises(BodyError, match=rf"length = {value!r}: expected a number from 1 to 1\.2"):
+            lengths.at(length=value)
 
 
 def test_samples_that_differ_are_refused_by_name(job, lengths):
@@ -211,3 +217,34 @@ def test_modes_that_cross_the_cutoff_are_refused(job):
 def test_values_that_do_not_ascend_are_refused(job):
     with pytest.raises(JobError, match=r"length: expected two to 7 ascending values, got 1\.2, 1"):
         reduce_family(job, {"length": [1.2, 1.0]})
+    with pytest.raises(JobError, match=r"length: expected two to 7 ascending values, got nan, 1"):
+        reduce_family(job, {"length": [np.nan, 1.0]})
+    with pytest.raises(JobError, match=r"expected one to 3 parameters, got 0"):
+        reduce_family(job, {})
+
+
+@pytest.mark.parametrize(
+    ("over", "words"),
+    [
+        ("lenght=1,1.2", "there is no parameter 'lenght'; did you mean 'length'"),
+        ("length=1,nan", "expected NAME=FROM:TO:N or NAME=A,B,C"),
+        ("length=1:1.2", "expected NAME=FROM:TO:N or NAME=A,B,C"),
+        ("length=1", "expected two to 7 ascending values, got 1\n"),
+        ("length=1:1.2:99", "expected two to 7 ascending values, got 1, 1.00204, "),
+        ("reduction.n_modes=-2,4", "reduction.n_modes = -2: expected a whole number"),
+    ],
+)
+def test_values_that_are_none_are_refused_by_the_command(job, over, words):
+    result = run_cms("family", job, "--over", over)
+    assert_refused(result, words)
+    assert len(result.stderr) < 400
+
+
+def test_the_command_interpolates_no_text_and_no_damaged_file(lengths, tmp_path):
+    path = tmp_path / "family.h5"
+    write_parametric_body(lengths, path)
+    assert_refused(run_cms("interpolate", path, "--set", "length=long"), "length = 'long': expected a number from 1")
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+    assert_refused(run_cms("interpolate", path, "--set", "length=1.1"), "family.h5: this parametric-body was altered")

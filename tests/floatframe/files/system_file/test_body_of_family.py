@@ -55,7 +55,7 @@ def test_a_sweep_changes_the_parameter_of_the_family_by_its_key_path(family):
     path, _ = family
     system, _ = read_system(path, {"bodies.arm.at.length": 1.05})
     assert_array_equal(system.body("arm").reduced.interface("end").position, [1.05 / 2, 0, 0])
-    with pytest.raises((ModelError, SystemFileError), match=r"bodies\.arm\.file: .* length = 1\.3: outside"):
+    with pytest.raises((ModelError, SystemFileError), match=r"bodies\.arm\.at: .* length = 1\.3: outside"):
         read_system(path, {"bodies.arm.at.length": 1.3})
 
 
