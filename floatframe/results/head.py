@@ -19,8 +19,11 @@ __all__ = ["BodyEntry", "Head", "head_of_text", "text_of_head"]
 Count = Annotated[int, Field(ge=0)]
 #: words in messages of pydantic, and ours
 WORDS = {
-    "Input should be": "expected", "a valid string": "text", "a valid integer": "a whole number", "a valid": "a",
-    "Field required": "missing", "Unexpected keyword argument": "unknown key",
+    "Input should be greater than or equal to": "expected at least", "Input should be": "expected",
+    "List should have": "expected", "Tuple should have": "expected", " after validation": "",
+    "a valid string": "text", "a valid integer": "a whole number", "a valid boolean": "true or false",
+    "a valid array": "a list", "a valid": "a", "Field required": "missing",
+    "Unexpected keyword argument": "unknown key",
 }  # fmt: skip
 ANY_OTHER_KEYS = ConfigDict(extra="allow", strict=True, allow_inf_nan=False)
 
