@@ -55,7 +55,7 @@ def announced_compilation(log: logging.Logger, code: str, duration: str) -> Iter
                 self.began = time.perf_counter()
                 log.warning(
                     "compiling %s, once on this machine, %s; the command `floatframe prepare` does it in advance",
-                    code, duration,
+                    code, duration, extra={"is_progress": True},
                 )  # fmt: skip
                 self.bar = notebook_bar(f"compiling {code}, {duration}")
 

@@ -9,24 +9,29 @@ __all__ = ["recorded_notes"]
 
 
 class RecordingHandler(logging.Handler):
-    """Logging handler that collects the warnings of one thread."""
+    """Logging handler that collects the warnings of one thread, but passes reports of progress on at once."""
 
-    def __init__(self) -> None:
+    def __init__(self, others: list[logging.Handler]) -> None:
         super().__init__(logging.WARNING)
-        self.thread = threading.get_ident()
+        self.thread, self.others = threading.get_ident(), others
         self.notes: list[str] = []
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Store one warning."""
-        if record.thread == self.thread and not record.name.startswith("distributed"):
+        """Store one warning, or pass it on."""
+        if getattr(record, "is_progress", False):
+            for each in self.others or filter(None, [logging.lastResort]):  # processes of workers have none
+                each.handle(record)
+        elif record.thread == self.thread and not record.name.startswith("distributed"):
             self.notes.append(record.getMessage())
 
 
 @contextmanager
 def recorded_notes() -> Iterator[list[str]]:
     """Collect warnings for the row, which reports them with the name of the job, instead of printing them."""
-    root, kept = logging.getLogger(), RecordingHandler()
-    before, root.handlers = root.handlers, [kept]
+    root = logging.getLogger()
+    before = root.handlers
+    kept = RecordingHandler(before)
+    root.handlers = [kept]
     try:
         yield kept.notes
     finally:

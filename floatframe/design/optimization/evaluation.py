@@ -119,7 +119,7 @@ class Evaluation:
     numbers: tuple[tuple[float, ...], ...] = ()  #: of each objective and constraint: one, or one per table time
     error: str = ""  #: reason why there are no numbers
     is_lasting: bool = True  #: whether another attempt would give the same error; False if the process was killed
-    notes: tuple[str, ...] = ()  #: warnings, if it was computed in this call
+    notes: tuple[str, ...] = ()  #: warnings
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,7 @@ class EvaluationFunction:
 
     def record(self, row: Evaluation) -> dict[str, Any] | None:
         """Return the numbers, unless another attempt may succeed."""
-        return {"numbers": row.numbers, "error": row.error} if row.is_lasting else None
+        return {"numbers": row.numbers, "error": row.error, "notes": row.notes} if row.is_lasting else None
 
     def row(self, values: tuple[float, ...], record: dict[str, Any]) -> Evaluation:
         """Return the evaluation of a record."""
@@ -179,7 +179,7 @@ class EvaluationFunction:
         expected = tuple(1 if q.times is None else len(q.times) for q in self.design.quantities)
         if not record["error"] and tuple(map(len, numbers)) != expected:
             raise ValueError("a record of another design")
-        return Evaluation(values, numbers, str(record["error"]))
+        return Evaluation(values, numbers, str(record["error"]), notes=tuple(map(str, record.get("notes", ()))))
 
 
 def numbers_of(quantity: Quantity, system: System, motion: Trajectory) -> tuple[float, ...]:

@@ -42,6 +42,7 @@ from floatframe.simulation.integrate import integrate
 __all__ = ["StudyRow", "StudyTable", "report_notes", "run_study", "sendable_study"]
 
 log = logging.getLogger(__name__)
+NUMBER = re.compile(r"(?<![\w'])\d[\d.e+-]*")  #: a number in a note, but not in a name
 
 
 # a point of a study and its result ------------------------------------------------------------------------------------
@@ -56,7 +57,7 @@ class StudyRow:
     units: tuple[str, ...]
     error: str = ""  #: reason of a failure
     is_lasting: bool = True  #: whether a repeated attempt would give the same result; False for a killed process
-    notes: tuple[str, ...] = ()  #: warnings of the point, if it was computed in this call
+    notes: tuple[str, ...] = ()  #: warnings of the point
 
 
 # study ----------------------------------------------------------------------------------------------------------------
@@ -186,10 +187,14 @@ def report_notes(notes: Iterable[Sequence[str]]) -> None:
     """Log, of the notes of all points, the first of those that differ only in their numbers, and how many they are."""
     found: dict[str, list[str]] = {}
     for of_point in notes:
-        for kind, note in {re.sub(r"\d[\d.e+-]*", "#", note): note for note in reversed(of_point)}.items():
+        first: dict[str, str] = {}
+        for note in of_point:
+            first.setdefault(NUMBER.sub("#", note), note)
+        for kind, note in first.items():
             found.setdefault(kind, []).append(note)
     for same in found.values():
-        log.warning("%s%s", same[0], f" (and at {len(same) - 1} more points)" if len(same) > 1 else "")
+        n = len(same) - 1
+        log.warning("%s%s", same[0], f" (and at {n} more {'point' if n == 1 else 'points'})" if n else "")
 
 
 def sendable_study(study: Study) -> Study:
@@ -272,14 +277,15 @@ class StudyPoint:
     def record(self, row: StudyRow) -> dict[str, Any] | None:
         """Return outputs and error of a row, unless a repeated attempt could give another result."""
         outputs = [float(value) for value in row.outputs]
-        return {"outputs": outputs, "units": row.units, "error": row.error} if row.is_lasting else None
+        content = {"outputs": outputs, "units": row.units, "error": row.error, "notes": row.notes}
+        return content if row.is_lasting else None
 
     def row(self, point: tuple[Any, ...], record: dict[str, Any]) -> StudyRow:
         """Return the row of a record."""
         outputs, units = tuple(record["outputs"]), tuple(record["units"])
         if not len(outputs) == len(units) == len(self.study.outputs) or not all(type(v) is float for v in outputs):
             raise ValueError("a record of another study")
-        return StudyRow(point, outputs, units, str(record["error"]))
+        return StudyRow(point, outputs, units, str(record["error"]), notes=tuple(map(str, record.get("notes", ()))))
 
     def motion(self, system: System, given: RunOptions | None) -> Trajectory:
         """Return the motion of the analysis; an equilibrium is a motion with one time."""

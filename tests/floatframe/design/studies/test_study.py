@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 
 from fe_models.foundation.toml_file import FileContent, changed
 from floatframe import GeneralizedAlpha, integrate
-from floatframe.design.studies.study import StudyPoint, run_study
+from floatframe.design.studies.study import StudyPoint, report_notes, run_study
 from floatframe.design.studies.study_file import read_study
 from floatframe.errors import SystemFileError
 from floatframe.files.system_file.read_system import read_system
@@ -174,9 +174,17 @@ def test_a_note_of_many_points_is_told_once(folder, monkeypatch, caplog):
     plain = StudyPoint.motion
     monkeypatch.setattr(StudyPoint, "motion", noted)
     (folder / "study.toml").write_text(STUDY.replace('"modes"', '"static"').replace('"frequency 1"', '"hinge.angle"'))
-    table = run_study(read_study(folder / "study.toml"), workers=1)
-    assert [row.notes for row in table.rows][:2] == [("mass 1 is large",), ("mass 2 is large",)]
-    assert [text for text in caplog.messages if "large" in text] == ["mass 1 is large (and at 5 more points)"]
+    for n_known in (0, 6):  # the notes are in the journal too
+        caplog.clear()
+        table = run_study(read_study(folder / "study.toml"), workers=1, journal=folder / "study.journal")
+        assert table.n_known == n_known
+        assert [row.notes for row in table.rows][:2] == [("mass 1 is large",), ("mass 2 is large",)]
+        assert [text for text in caplog.messages if "large" in text] == ["mass 1 is large (and at 5 more points)"]
+
+
+def test_notes_on_two_numbered_bodies_are_both_told(caplog):
+    report_notes([("body 'arm1': 2 modes", "body 'arm2': 2 modes"), ("body 'arm2': 3 modes",)])
+    assert caplog.messages == ["body 'arm1': 2 modes", "body 'arm2': 2 modes (and at 1 more point)"]
 
 
 def test_what_nobody_foresaw_is_a_row_too(folder, monkeypatch):
