@@ -10,6 +10,7 @@ from tests.root import ROOT
 RECIPE = yaml.safe_load((ROOT / "recipe" / "recipe.yaml").read_text())
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 CONDA_NAMES = {"matplotlib": "matplotlib-base"}  #: where conda-forge has another name
+CONDITIONS = {"platform_machine in 'x86_64 AMD64' and sys_platform != 'darwin'": "x86_64 and not osx"}
 
 
 def as_conda(requirement):
@@ -26,7 +27,9 @@ def test_the_recipe_requires_what_the_project_requires():
     assert always == [
         f"python {PROJECT['requires-python']}", *(as_conda(each) for each in needed if ";" not in each)
     ]  # fmt: skip
-    assert [each["then"] for each in conditional] == [as_conda(each) for each in needed if ";" in each]
+    assert {each["then"]: each["if"] for each in conditional} == {
+        as_conda(each): CONDITIONS[each.split(";")[1].strip()] for each in needed if ";" in each
+    }
 
 
 def test_the_recipe_has_the_version_and_the_commands_of_the_project():
