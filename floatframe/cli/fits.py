@@ -185,7 +185,8 @@ def optimize_command(
     from floatframe.files.system_file.read_system import read_system
 
     described = read_design(design, changes_of(set_values))
-    inputs = (design, Path(described.study.system), *read_system(described.study.system)[0].files, *described.tables)
+    files = read_system(described.study.system, described.study.given)[0].files
+    inputs = (design, Path(described.study.system), *files, *described.tables)
     kept = output_path(journal, design.with_suffix(".journal"), ModelError, overwrite_of=inputs, needs_file=True)
     default = [] if json else [design.with_suffix(".csv"), design.with_suffix(".png")]
     endings = (*TABLES, *PICTURES, ".toml")

@@ -65,7 +65,7 @@ def sweep_command(
     from floatframe.files.system_file.read_system import read_system
 
     described = replace(read_study(study), given=changes_of(set_values))
-    inputs = (study, Path(described.system), *read_system(described.system)[0].files)
+    inputs = (study, Path(described.system), *read_system(described.system, described.given)[0].files)
     kept = output_path(journal, study.with_suffix(".journal"), ModelError, overwrite_of=inputs, needs_file=True)
     default = [] if json else [study.with_suffix(".csv")]
     paths = output_files(outputs, default, (*TABLES, *PICTURES), ModelError, overwrite_of=(*inputs, kept))

@@ -126,7 +126,7 @@ def optimize(
     for analysis in design.analyses:
         study = design.study_of(analysis)
         check(replace(study, analysis="modes", outputs=()) if analysis == "response" else study, start_point)
-    files = read_system(design.study.system)[0].files
+    files = read_system(design.study.system, design.study.given)[0].files
     kept = None if journal is None else open_journal(Path(journal), design, files)
     with tasks_of(design.workers if workers is None else workers) as tasks:
         evaluator = Evaluator(design, tasks, kept, files, progress)

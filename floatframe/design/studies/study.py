@@ -165,7 +165,7 @@ def run_study(
 
     points = list(study.points())
     check(study, points[0])
-    files = read_system(study.system)[0].files
+    files = read_system(study.system, study.given)[0].files
     kept = None
     if journal is not None:
         asked = (
@@ -207,6 +207,9 @@ def check(study: Study, point: tuple[Any, ...]) -> None:
     """Raise if the system, a key path or an output does not exist; run in this process before the long work."""
     from floatframe.files.system_file.read_system import read_system
 
+    for parameter in study.parameters:
+        if parameter.path in study.given:
+            raise ModelError(f"--set {parameter.path}: parameter {quoted(parameter.name)} varies this key; remove it")
     plain, run = read_system(study.system, study.given)
     if study.analysis in MOTIONS:
         required_run(run, study.system, begins_there=True)

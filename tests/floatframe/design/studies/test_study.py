@@ -74,6 +74,20 @@ def test_set_gives_other_keys_one_value_at_all_points(folder):
     assert_allclose(found, [swing_of(mass, 1.62) for mass in (1.0, 2.0, 4.0)], rtol=1e-8)
     assert "another system, other parameters" in sweep(folder / "mass.toml", "-j", 1, code=2)
     assert "did you mean" in sweep(folder / "mass.toml", "--set", "system.gravty=1", "--journal", folder / "x", code=2)
+    words = "--set", "bodies.rod.mass=3", "--journal", folder / "x"
+    assert "parameter 'mass' varies this key" in sweep(folder / "mass.toml", *words, code=2)
+
+
+def test_a_file_given_by_set_is_an_input_of_the_study(folder):
+    """The digest of the journal covers its content."""
+    (folder / "pendulum.toml").write_text(PENDULUM + '\n[signals.push]\nfile = "push.csv"\nunit = "-"\n')
+    for name in ("push", "pull"):
+        (folder / f"{name}.csv").write_text("t,v\n0,0\n1,1\n2,0\n3,1\n")
+    (folder / "study.toml").write_text(STUDY)
+    words = folder / "study.toml", "-j", 1, "--set", 'signals.push.file="pull.csv"'
+    sweep(*words)
+    (folder / "pull.csv").write_text("t,v\n0,0\n1,2\n2,0\n3,1\n")
+    assert "journal is of another system" in sweep(*words, code=2)
 
 
 @pytest.mark.long  # with processes alone below; what a cluster does with tasks: tests/fe_models/foundation/tasks
