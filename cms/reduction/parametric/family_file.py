@@ -17,18 +17,19 @@ from cms.errors import CmsError, ModalFileError
 from cms.reduction.parametric.interpolation_errors import InterpolationErrors
 from cms.reduction.parametric.parametric_body import ParametricBody
 from fe_models.foundation.seal import Kind
+from fe_models.foundation.words import quoted
 
 __all__ = ["read_parametric_body", "write_parametric_body"]
 
 KIND = Kind("parametric-body", 1, ModalFileError, "`cms family`")
 SAMPLES, PARAMETERS, ERRORS = "/samples", "/parameters", "/errors"  #: paths of the groups
-#: unit and description of each dataset of the errors
+#: number of axes and description of each dataset of the errors
 OF_ERRORS = {
-    "frequency": "relative error of each frequency with the frame fixed",
-    "free_frequency": "relative error of each free-free frequency",
-    "static": "relative error of the static response of the interfaces",
-    "mass": "relative error of the mass",
-    "inertia": "relative error of the inertia tensor",
+    "frequency": (1, "relative error of each frequency with the frame fixed"),
+    "free_frequency": (1, "relative error of each free-free frequency"),
+    "static": (0, "relative error of the static response of the interfaces"),
+    "mass": (0, "relative error of the mass"),
+    "inertia": (0, "relative error of the inertia tensor"),
 }
 
 
@@ -59,7 +60,7 @@ def write_parametric_body(body: ParametricBody, path: str | os.PathLike[str]) ->
         attributes[at] = {**attributes.get(at, {}), "modal_file_version": version_of(sample)}
     if body.errors is not None:
         attributes[ERRORS] = {"method": body.errors.method}
-        for name, words in OF_ERRORS.items():
+        for name, (_, words) in OF_ERRORS.items():
             datasets[f"{ERRORS}/{name}"] = Dataset(np.asarray(getattr(body.errors, name), float), "1", words)
     write_sealed(Content(KIND.format, KIND.version, datasets, attributes), path)
 
@@ -81,11 +82,13 @@ def read_parametric_body(path: str | os.PathLike[str]) -> ParametricBody:
     contents = Contents(content)
     try:
         names = contents.value(f"{PARAMETERS}/names")
-        values = {name: tuple(contents.value(f"{PARAMETERS}/values_{k}").tolist()) for k, name in enumerate(names)}
+        if not isinstance(names, tuple) or len(set(names)) < len(names):
+            raise ModalFileError(f"dataset {PARAMETERS}/names: expected different texts, got {quoted(names)}")
+        values = {name: tuple(numbers(contents, f"{PARAMETERS}/values_{k}", 1)) for k, name in enumerate(names)}
         n = int(np.prod([len(given) for given in values.values()]))
         errors = None
         if contents.has(ERRORS):
-            found = {name: contents.value(f"{ERRORS}/{name}") for name in OF_ERRORS}
+            found = {name: numbers(contents, f"{ERRORS}/{name}", n_axes) for name, (n_axes, _) in OF_ERRORS.items()}
             errors = InterpolationErrors(**found, method=contents.attribute(ERRORS, "method", str))
         return ParametricBody(
             values, tuple(body_of(content_below(content, f"{SAMPLES}/{k}")) for k in range(n)), errors
@@ -94,9 +97,23 @@ def read_parametric_body(path: str | os.PathLike[str]) -> ParametricBody:
         raise ModalFileError(f"{Path(path)}: {error}") from error
 
 
+def numbers(contents: Contents, path: str, n_axes: int) -> Any:
+    """Return the numbers of a dataset after a check of its number of axes."""
+    value = contents.value(path)
+    if isinstance(value, tuple) or np.ndim(value) != n_axes:
+        got = "text" if isinstance(value, tuple) else f"shape {np.shape(value)}"
+        raise ModalFileError(f"dataset {path}: expected {'a list of numbers' if n_axes else 'one number'}, got {got}")
+    return value
+
+
 def content_below(content: Content, at: str) -> Content:
     """Return the content of the modal file of a sample."""
     version = Contents(content).attribute(at, "modal_file_version", int)
+    if not 1 <= version <= VERSION:
+        raise ModalFileError(
+            f"{at} has version {version} of the modal file, this program reads versions 1 to {VERSION}; update the "
+            "program (pip install -U floatframe)"
+        )
     datasets = {path.removeprefix(at): each for path, each in content.datasets.items() if path.startswith(f"{at}/")}
     groups = {path.removeprefix(at) or "/": group for path, group in content.attributes.items()
               if path == at or path.startswith(f"{at}/")}  # fmt: skip

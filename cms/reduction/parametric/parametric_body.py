@@ -107,6 +107,10 @@ class ParametricBody:
         if len(self.samples) != n:
             raise BodyError(f"parametric body: expected {n} samples, one at each point, got {len(self.samples)}")
         require_same_reduction(self.samples, self.names)
+        if self.errors is not None and len(self.errors.frequency) != self.samples[0].n_q:
+            raise BodyError(
+                f"parametric body: {self.samples[0].n_q} modes, but errors of {len(self.errors.frequency)} frequencies"
+            )
 
     def summary(self) -> Summary:
         """Return what `repr` and notebooks show: parameters with their values, modes, and errors."""

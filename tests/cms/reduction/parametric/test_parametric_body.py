@@ -1,5 +1,6 @@
 """Bodies that are interpolated between samples, beside reductions at the same values."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -7,10 +8,13 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import cms
+from cms.body.modal_file.contents import Dataset
+from cms.body.modal_file.file import read_sealed, write_sealed
 from cms.errors import BodyError, JobError, ModalFileError
 from cms.jobs.job import read_job
 from cms.reduction import convert_frame, parametric_body, read_parametric_body, reduce_family, write_parametric_body
 from cms.reduction.parametric.alignment import align, recombined
+from cms.reduction.parametric.family_file import KIND
 from cms.reduction.parametric.interpolation_errors import errors_between
 from fe_models.meshes.numbering import Numbering
 from tests.cms.command import assert_refused, run_cms
@@ -174,6 +178,39 @@ def test_a_family_file_keeps_everything(lengths, tmp_path):
     assert back.errors.method == lengths.errors.method == "a reduction at length = 1.1"
     with pytest.raises(ModalFileError, match="expected a modal-file, got a parametric-body"):
         cms.read(tmp_path / "family.h5")
+
+
+@pytest.mark.parametrize(
+    ("path", "values", "words"),
+    [
+        ("/parameters/names", ("length", "length"), "expected different texts, got ('length', 'length')"),
+        ("/parameters/names", np.ones(1), "expected different texts"),
+        ("/parameters/values_0", ("1", "2"), "expected a list of numbers, got text"),
+        ("/parameters/values_0", np.ones((2, 2)), r"expected a list of numbers, got shape (2, 2)"),
+        ("/errors/static", np.ones(2), r"expected one number, got shape (2,)"),
+        ("/errors/frequency", np.ones(3), "16 modes, but errors of 3 frequencies"),
+    ],
+)
+def test_a_family_file_with_impossible_content_is_refused(lengths, tmp_path, path, values, words):
+    content = content_of_file(lengths, tmp_path / "family.h5")
+    write_sealed(replace(content, datasets={**content.datasets, path: Dataset(values)}), tmp_path / "family.h5")
+    with pytest.raises(ModalFileError, match=re.escape(words)):
+        read_parametric_body(tmp_path / "family.h5")
+
+
+def content_of_file(family, path):
+    """Return the content of a family file without its digest."""
+    write_parametric_body(family, path)
+    content = read_sealed(path, KIND)
+    return replace(content, attributes={**content.attributes, "/": {"name": content.attributes["/"]["name"]}})
+
+
+def test_samples_of_a_later_version_are_refused(lengths, tmp_path):
+    content = content_of_file(lengths, tmp_path / "family.h5")
+    later = {**content.attributes, "/samples/1": {**content.attributes["/samples/1"], "modal_file_version": 99}}
+    write_sealed(replace(content, attributes=later), tmp_path / "family.h5")
+    with pytest.raises(ModalFileError, match=r"/samples/1 has version 99 of the modal file, .* update the program"):
+        read_parametric_body(tmp_path / "family.h5")
 
 
 def test_values_outside_and_other_names_are_refused(lengths):
