@@ -92,7 +92,7 @@ class Bushing:
                 )
             if not isinstance(function, TimeFunction):
                 raise ModelError(
-                    f"{where}: characteristics: {name}: expected a function of functions.time_functions, such as "
+                    f"{where}: characteristics: {name}: expected a function of floatframe.functions, such as "
                     f"table(x, force), got {function!r}"
                 )
         if not (self.stiffness.any() or self.damping.any() or self.preload.any() or self.characteristics):

@@ -73,7 +73,7 @@ class BodyLoad:
             object.__setattr__(self, "amplitude", constant(value))
         if not isinstance(self.amplitude, TimeFunction):
             raise ModelError(
-                f"force {self.name!r}: amplitude: expected a number or a function of functions.time_functions, got "
+                f"force {self.name!r}: amplitude: expected a number or a function of floatframe.functions, got "
                 f"{self.amplitude!r}"
             )
 
@@ -113,9 +113,7 @@ class PointForce:
     def __post_init__(self) -> None:
         if not isinstance(self.amplitude, TimeFunction | None):
             raise ModelError(
-                f"force {self.name!r}: amplitude: expected a function of "
-                f"floatframe.model.functions.time_functions, got "
-                f"{self.amplitude!r}"
+                f"force {self.name!r}: amplitude: expected a function of floatframe.functions, got {self.amplitude!r}"
             )
         for name in ("force", "torque"):
             value = array_of_shape(f"force {self.name!r}: {name}", getattr(self, name), (3,))

@@ -67,7 +67,7 @@ class SpringDamper:
             object.__setattr__(self, "free_length", value)
         if not isinstance(self.characteristic, TimeFunction | None):
             raise ModelError(
-                f"{where}: characteristic: expected a function of functions.time_functions, such as table(x, force), "
+                f"{where}: characteristic: expected a function of floatframe.functions, such as table(x, force), "
                 f"got {self.characteristic!r}"
             )
         if self.stiffness == 0 and self.damping == 0 and self.preload == 0 and self.characteristic is None:
@@ -150,7 +150,7 @@ class JointForce:
         for name in ("motor", "characteristic"):
             if not isinstance(getattr(self, name), TimeFunction | None):
                 raise ModelError(
-                    f"{where}: {name}: expected a function of functions.time_functions, got {getattr(self, name)!r}"
+                    f"{where}: {name}: expected a function of floatframe.functions, got {getattr(self, name)!r}"
                 )
         numbers = self.stiffness, self.damping, self.preload, self.friction, self.friction_coefficient
         if not any(numbers) and self.motor is None and self.characteristic is None:

@@ -96,7 +96,7 @@ class UserForce:
         for key, function in self.functions.items():
             if not isinstance(function, TimeFunction):
                 raise ModelError(
-                    f"{where}: functions: {key}: expected a function of functions.time_functions, got {function!r}"
+                    f"{where}: functions: {key}: expected a function of floatframe.functions, got {function!r}"
                 )
         for key in self.forces:
             if key not in self.coordinates:

@@ -84,8 +84,8 @@ def checked_motions(joint: Any) -> None:
         motions[name] = constant(motion) if isinstance(motion, int | float) else motion
         if not isinstance(motions[name], TimeFunction):
             raise ModelError(
-                f"{where}: {name}: expected a function of functions.time_functions or a number, got {motion!r}; a "
-                "Python function can be sampled with floatframe.model.functions.time_functions.sampled"
+                f"{where}: {name}: expected a function of floatframe.functions or a number, got {motion!r}; a "
+                "Python function can be sampled with floatframe.functions.sampled"
             )
         for order, what in enumerate(("value", "rate")):
             times, sizes = motions[name].jumps(order)

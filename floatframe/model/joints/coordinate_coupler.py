@@ -114,8 +114,7 @@ class CoordinateCoupler:
             object.__setattr__(self, "constant", constant(number(f"{where}: constant", self.constant)))
         elif not isinstance(self.constant, TimeFunction | None):
             raise ModelError(
-                f"{where}: constant: expected a number or a function of floatframe.model.functions.time_functions, got "
-                f"{self.constant!r}"
+                f"{where}: constant: expected a number or a function of floatframe.functions, got {self.constant!r}"
             )
 
     @property
