@@ -133,10 +133,10 @@ def convert_units(reduced: ReducedBody, units: Units | str) -> ReducedBody:
     new = unit_system(units) if isinstance(units, str) else units
     if new == reduced.units:
         return reduced
-    record = {"units converted from": reduced.units.name}
     content = in_units(content_of(reduced, VERSION), reduced.units, new)
-    provenance = {"/provenance": dict(reduced.provenance) | record}
-    attributes = dict(content.attributes) | provenance
+    provenance = dict(reduced.provenance)
+    provenance.setdefault("units converted from", reduced.units.name)  # the units of its texts, also if converted twice
+    attributes = dict(content.attributes) | {"/provenance": provenance}
     body = body_of(replace(content, attributes=attributes))
     tables = {name: table.in_units(new) for name, table in reduced.recovery.items()}
     return replace(body, recovery=tables) if tables else body

@@ -11,10 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from cms.body.reduced_body import ReducedBody
 from cms.errors import ModeSetError
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.records import checked_fields
+from fe_models.foundation.units import UNIT_SYSTEMS
 
 __all__ = [
     "CUSTOMARY_STEPS",
@@ -27,6 +29,7 @@ __all__ = [
     "damping_of_words",
     "heavy_words",
     "modal_damping",
+    "stated_damping",
 ]
 
 HEAVY = 0.2  #: damping ratio above which the user must confirm it: 0.5 may be a mistake for 0.5 %
@@ -116,9 +119,9 @@ class RayleighDamping:
     Parameters
     ----------
     alpha
-        Factor on the mass [1/s].
+        Factor on the mass [1/time unit of the body].
     beta
-        Factor on the stiffness [s].
+        Factor on the stiffness [time unit of the body].
     """
 
     alpha: float = 0.0
@@ -146,6 +149,19 @@ def damping_of_words(words: str) -> Damping | None:
     except (SyntaxError, KeyError, TypeError, ValueError):
         return None
     return made
+
+
+def stated_damping(body: ReducedBody) -> Damping | None:
+    """Return the damping that the provenance of a body states, in the units of the body; None: none, or unknown text.
+
+    The text stays as it is when units are converted.
+    """
+    damping = damping_of_words(body.provenance.get("damping", "none"))
+    if not isinstance(damping, RayleighDamping):
+        return damping
+    former = UNIT_SYSTEMS.get(body.provenance.get("units converted from", ""), body.units)
+    ratio = body.units.time / former.time
+    return RayleighDamping(damping.alpha * ratio, damping.beta / ratio)
 
 
 def modal_damping(damping: Damping, M: Array, K: Array, *, second: float = 1.0) -> Array:

@@ -25,7 +25,7 @@ import numpy as np
 
 from cms.body.reduced_body import BodyFrame, ReducedBody
 from cms.errors import BodyError
-from cms.reduction.basis.damping import damping_of_words, modal_damping
+from cms.reduction.basis.damping import modal_damping, stated_damping
 from cms.reduction.basis.frames import FRAMES, Axes, NodalFrame, TisserandFrame
 from cms.reduction.frame_conversion import Change, changed_body, convert_frame
 from fe_models.foundation.arrays import Array
@@ -147,7 +147,7 @@ def in_mean_axes(sample: ReducedBody) -> ReducedBody:
 
     The damping of its modes that the provenance states is left out.
     """
-    sample = replace(sample, D=sample.D - stated_damping(sample))
+    sample = replace(sample, D=sample.D - damping_of_modes(sample))
     return sample if sample.is_held else convert_frame(sample, TisserandFrame(axes=axes_of(sample.frame)))
 
 
@@ -170,12 +170,12 @@ def in_frame(body: ReducedBody, frame: BodyFrame, provenance: dict[str, str]) ->
         made = replace(made, free_frequencies=free)
     geometric = None if made.geometric is None else replace(made.geometric, turned=None, spread=None)
     made = replace(made, provenance=provenance, geometric=geometric)
-    return replace(made, D=made.D + stated_damping(made))
+    return replace(made, D=made.D + damping_of_modes(made))
 
 
-def stated_damping(body: ReducedBody) -> Array:
+def damping_of_modes(body: ReducedBody) -> Array:
     """Return the damping of the modes that the provenance states, (n_q, n_q) [1/s]; zero if it states none."""
-    damping = damping_of_words(body.provenance.get("damping", "none"))
+    damping = stated_damping(body)
     if damping is None or CONVERTED in body.provenance:
         return np.zeros_like(body.K)
     return modal_damping(damping, body.M, body.K, second=body.units.time)

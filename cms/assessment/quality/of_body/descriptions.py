@@ -5,7 +5,7 @@ import scipy.linalg as la
 
 from cms.assessment.quality.record import QualityRecord, information, judge
 from cms.body.reduced_body import ReducedBody, unit_findings
-from cms.reduction.basis.damping import damping_of_words, modal_damping
+from cms.reduction.basis.damping import modal_damping, stated_damping
 from fe_models.checks.first_order import PROVENANCE
 from fe_models.meshes.quadratic_mesh import FIRST_ORDER
 
@@ -49,7 +49,7 @@ def check_damping_told(reduced: ReducedBody) -> QualityRecord:
     largest entry of both; first, rows and columns of both are divided by the square roots of the frequencies.
     """
     told = reduced.provenance.get("damping")
-    damping = None if told is None else damping_of_words(told)
+    damping = stated_damping(reduced)
     if "frame converted from" in reduced.provenance or damping is None:
         return information("damping-told", "the provenance names no damping of these modes")
     made = modal_damping(damping, reduced.M, reduced.K, second=reduced.units.time)

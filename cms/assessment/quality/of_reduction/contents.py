@@ -28,7 +28,7 @@ from cms.errors import CmsError
 from cms.modes.families.families import Families
 from cms.modes.families.rigid_modes import rounding_of_energy
 from cms.modes.mode_set import ModeSet
-from cms.reduction.basis.damping import Damping, damping_of_words, modal_damping
+from cms.reduction.basis.damping import Damping, modal_damping, stated_damping
 from cms.reduction.basis.finishing import SUSPECT_ENERGY, FinishedBasis
 from cms.reduction.basis.frames import Frame, FrameCondition, HeldFrame, frame_condition
 from cms.reduction.basis.free_basis import FreeBasis
@@ -366,7 +366,7 @@ def wanted_damping(case: Case) -> tuple[Array | None, str]:
     """Return the expected damping matrix and its description; None if it is unknown."""
     reduced, options = case.reduced, case.options
     told = reduced.provenance.get("damping", "none")
-    damping: Damping | StrainDamping | None = damping_of_words(told)
+    damping: Damping | StrainDamping | None = stated_damping(reduced)
     words = f"provenance: {told}"
     if CONVERTED in reduced.provenance:
         if options is None:

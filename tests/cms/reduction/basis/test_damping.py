@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from cms.assessment.quality.body_check import check_body
+from cms.body.modal_file.file import convert_units
 from cms.errors import ModeSetError
 from cms.modes.mode_sets import craig_bampton
 from cms.reduction.basis.damping import (
@@ -13,6 +15,7 @@ from cms.reduction.basis.damping import (
     RayleighDamping,
     damping_of_words,
     modal_damping,
+    stated_damping,
 )
 from cms.reduction.basis.frames import NodalFrame
 from cms.reduction.reduction import reduce
@@ -39,6 +42,16 @@ def test_the_ramp_is_in_hertz_whatever_the_time_unit():
     D = modal_damping(RampDamping(), np.eye(6), K)
     in_ms = modal_damping(RampDamping(), np.eye(6), K * 1e-6, second=1e-3)
     assert_allclose(in_ms, D * 1e-3, rtol=1e-14)
+
+
+def test_stated_rayleigh_damping_is_in_the_units_of_the_body():
+    """Its text keeps the units of the reduction; a second conversion does not lose them."""
+    body = couple(bar(nx=2))
+    made = reduce(body, craig_bampton(body, n_modes=3), damping=RayleighDamping(3.0, 2e-4))
+    in_ms = convert_units(made, "mm-kg-ms")
+    for each in (made, in_ms, convert_units(made, "mm-t-s"), convert_units(in_ms, "mm-t-s")):
+        assert_allclose(modal_damping(stated_damping(each), each.M, each.K), each.D, rtol=1e-12)
+        assert {record.name: record.verdict for record in check_body(each)}["damping-told"] == "pass"
 
 
 def test_the_last_ratio_of_a_list_holds_for_all_further_modes():

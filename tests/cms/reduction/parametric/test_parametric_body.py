@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import cms
 from cms.body.modal_file.contents import Dataset
-from cms.body.modal_file.file import read_sealed, write_sealed
+from cms.body.modal_file.file import convert_units, read_sealed, write_sealed
 from cms.errors import BodyError, JobError, ModalFileError
 from cms.jobs.job import read_job
 from cms.reduction import convert_frame, parametric_body, read_parametric_body, reduce_family, write_parametric_body
@@ -159,14 +159,18 @@ def test_a_damped_body_in_general_position_responds_as_its_reduction(tmp_path, d
     nodes = np.stack([5 + x, 0.2 * x - 3 + 0.1 * x**2, 2 - 0.3 * x], axis=1)
     frame = 'at = "root"\norigin = [5.2, -2.9, 2.1]\naxes = [[0, 0.6, 0.8], [0, -0.8, 0.6], [1, 0, 0]]'
     job = write_job(tmp_path, nodes, JOB.replace('at = "root"', frame).replace("ratio = 0.01", damping))
-    found = reduce_family(job, {"thickness": THICKNESSES}).at(thickness=0.02)
-    expected = reduced(job, thickness=0.02)
+    family = reduce_family(job, {"thickness": THICKNESSES})
+    found, expected = family.at(thickness=0.02), reduced(job, thickness=0.02)
     band = np.linspace(10, 1.1 * expected.free_frequencies[3], 200)
     H, H_expected = cms.frf(found, band).H, cms.frf(expected, band).H
     away = np.linalg.norm(H - H_expected, axis=(1, 2)) / np.linalg.norm(H_expected, axis=(1, 2))
     assert away.max() < 0.02
     assert_allclose(found.moments.S, expected.moments.S, rtol=1e-12)
     assert_allclose(found.moments.R, expected.moments.R, rtol=0, atol=1e-5 * np.trace(expected.moments.R))
+    in_ms = parametric_body(family.values, [convert_units(each, "mm-kg-ms") for each in family.samples])
+    own, other = convert_units(found, "mm-kg-ms"), in_ms.at(thickness=0.02)
+    assert_allclose(other.K, own.K, rtol=0, atol=1e-10 * own.K.max())
+    assert_allclose(np.diag(other.D), np.diag(own.D), rtol=1e-9)
 
 
 def test_a_family_file_keeps_everything(lengths, tmp_path):
