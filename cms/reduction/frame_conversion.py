@@ -23,7 +23,7 @@ from cms.body.stress import PointStress
 from cms.errors import BodyError
 from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
 from cms.linear_algebra.solvers.eigen import orientation
-from cms.reduction.basis.damping import Damping, modal_damping
+from cms.reduction.basis.damping import Damping, modal_damping, statement_of
 from cms.reduction.basis.frames import (
     BuckensFrame,
     Frame,
@@ -269,7 +269,7 @@ def changed_body(
     old = reduced.frame
     record = {"frame converted from": f"{old.kind}{f' at {old.at}' if old.at else ''}"}
     if damping is not None:
-        record["damping"] = str(damping)
+        record["damping"] = statement_of(damping, reduced)
     return replace(
         reduced,
         frame=frame,

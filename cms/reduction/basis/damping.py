@@ -30,6 +30,7 @@ __all__ = [
     "heavy_words",
     "modal_damping",
     "stated_damping",
+    "statement_of",
 ]
 
 HEAVY = 0.2  #: damping ratio above which the user must confirm it: 0.5 may be a mistake for 0.5 %
@@ -157,10 +158,23 @@ def stated_damping(body: ReducedBody) -> Damping | None:
     The text stays as it is when units are converted.
     """
     damping = damping_of_words(body.provenance.get("damping", "none"))
-    if not isinstance(damping, RayleighDamping):
+    return None if damping is None else in_time_unit(damping, body.units.time / time_of_texts(body))
+
+
+def statement_of(damping: Damping, body: ReducedBody) -> str:
+    """Return the text of a damping in the units of the body for its provenance, see `stated_damping`."""
+    return str(in_time_unit(damping, time_of_texts(body) / body.units.time))
+
+
+def time_of_texts(body: ReducedBody) -> float:
+    """Return the time unit of the texts in the provenance [s]: the one before conversions of units."""
+    return UNIT_SYSTEMS.get(body.provenance.get("units converted from", ""), body.units).time
+
+
+def in_time_unit(damping: Damping, ratio: float) -> Damping:
+    """Return the damping with numbers for a time unit that is larger by a ratio."""
+    if not isinstance(damping, RayleighDamping) or ratio == 1:
         return damping
-    former = UNIT_SYSTEMS.get(body.provenance.get("units converted from", ""), body.units)
-    ratio = body.units.time / former.time
     return RayleighDamping(damping.alpha * ratio, damping.beta / ratio)
 
 

@@ -18,6 +18,7 @@ from cms.reduction.basis.damping import (
     stated_damping,
 )
 from cms.reduction.basis.frames import NodalFrame
+from cms.reduction.frame_conversion import convert_frame
 from cms.reduction.reduction import reduce
 from fe_models.body.couplings.couplings import couple
 from tests.bodies import bar
@@ -52,6 +53,9 @@ def test_stated_rayleigh_damping_is_in_the_units_of_the_body():
     for each in (made, in_ms, convert_units(made, "mm-t-s"), convert_units(in_ms, "mm-t-s")):
         assert_allclose(modal_damping(stated_damping(each), each.M, each.K), each.D, rtol=1e-12)
         assert {record.name: record.verdict for record in check_body(each)}["damping-told"] == "pass"
+    converted = convert_frame(in_ms, NodalFrame("left"), damping=RayleighDamping(2e-3, 0.3))
+    for each in (converted, convert_units(converted, "mm-t-s")):
+        assert_allclose(modal_damping(stated_damping(each), each.M, each.K), each.D, rtol=1e-12)
 
 
 def test_the_last_ratio_of_a_list_holds_for_all_further_modes():
