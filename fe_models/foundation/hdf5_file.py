@@ -27,7 +27,6 @@ __all__ = [
     "Attribute",
     "Manifest",
     "as_attribute",
-    "attributes_of",
     "described",
     "digest_of",
     "opened",
@@ -383,8 +382,8 @@ def require_stored(item: Any, where: str, path: Path, kind: Kind) -> None:
 
 def require_digest(
     items: Mapping[str, Any], path: Path, kind: Kind, entry_of: Callable[[str, Any], Entry] | None = None
-) -> str:
-    """Return the digest of a file; raise the error of the kind unless attributes and datasets match it.
+) -> dict[str, dict[str, Any]]:
+    """Return the attributes by path; raise the error of the kind unless they and the datasets match the digest.
 
     Parameters
     ----------
@@ -398,8 +397,9 @@ def require_digest(
     import h5py
 
     entries, stated = [], None
+    found = {where: {name: as_attribute(item.attrs[name]) for name in item.attrs} for where, item in items.items()}
     for where, item in items.items():
-        attributes = attributes_of(item)
+        attributes = dict(found[where])
         if isinstance(item, h5py.Dataset):
             expected = attributes.pop(SHA256, None)
             entry = (entry_of or entry_in_blocks)(where, item)
@@ -413,7 +413,7 @@ def require_digest(
         raise altered(
             path, kind, "its contents do not have its digest (an attribute or a name was changed, or one is missing)"
         )
-    return str(stated)
+    return found
 
 
 def entry_in_blocks(where: str, item: Any) -> Entry:
@@ -426,11 +426,6 @@ def entry_in_blocks(where: str, item: Any) -> Entry:
     for block in blocks:
         digest.update(np.ascontiguousarray(item[block], dtype=kind).tobytes())
     return Entry(where, name, item.shape, digest.hexdigest())
-
-
-def attributes_of(item: Any) -> dict[str, Any]:
-    """Return the attributes of a group or dataset."""
-    return {name: as_attribute(item.attrs[name]) for name in item.attrs}
 
 
 def as_attribute(value: Any) -> Any:

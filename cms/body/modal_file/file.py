@@ -24,7 +24,6 @@ from fe_models.foundation.hdf5_file import (
     Entry,
     Manifest,
     as_attribute,
-    attributes_of,
     described,
     opened,
     own_items,
@@ -217,17 +216,19 @@ def fill(file: Any, content: Content) -> None:
 
 def walk(file: Any, path: Path, kind: Kind) -> tuple[dict[str, Dataset], dict[str, dict[str, Attribute]]]:
     """Return all datasets and group attributes; raise an error if one differs from its digest."""
-    datasets: dict[str, Dataset] = {}
+    values: dict[str, Any] = {}
 
     def entry_of(name: str, item: Any) -> Entry:
         """Keep the values of a dataset; return its entry of the manifest."""
-        values, attributes = as_values(item[()]), attributes_of(item)
-        datasets[name] = Dataset(values, str(attributes.get("unit", "1")), str(attributes.get("description", "")))
-        return described(name, values)[2]
+        values[name] = as_values(item[()])
+        return described(name, values[name])[2]
 
-    items = own_items(file, path, kind)
-    require_digest(items, path, kind, entry_of)
-    return datasets, {name: attributes_of(item) for name, item in items.items() if name not in datasets}
+    attributes = require_digest(own_items(file, path, kind), path, kind, entry_of)
+    datasets = {
+        name: Dataset(each, str(attributes[name].get("unit", "1")), str(attributes[name].get("description", "")))
+        for name, each in values.items()
+    }
+    return datasets, {name: each for name, each in attributes.items() if name not in datasets}
 
 
 def as_values(value: Any) -> Any:
