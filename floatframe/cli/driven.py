@@ -125,7 +125,7 @@ def driven_motion(
         if elastic == "dynamic":
             motion = integrate(
                 model, run.integrator, run.t_end, run.h, output=path, output_every=run.output_every,
-                progress=lambda p: advance(p.n_steps / p.n_total), state=run.start_state(model),
+                progress=lambda p: advance(p.n_steps / p.n_total), watch=run.watch, state=run.start_state(model),
             )  # fmt: skip
         else:
             motion = kinematics(

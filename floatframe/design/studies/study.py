@@ -301,8 +301,9 @@ class StudyPoint:
 def motion_of_run(system: System, run: RunOptions) -> Trajectory:
     """Return the integrated motion."""
     return integrate(
-        system, run.integrator, run.t_end, run.h, output_every=run.output_every, state=run.start_state(system)
-    )
+        system, run.integrator, run.t_end, run.h, output_every=run.output_every, watch=run.watch,
+        state=run.start_state(system),
+    )  # fmt: skip
 
 
 def equilibrium_of(system: System, formulation: str) -> Trajectory:

@@ -17,6 +17,7 @@ from floatframe import (
     System,
     integrate,
     inverse_dynamics,
+    read_results,
 )
 from floatframe.analyses import drive_forces, with_motors
 from floatframe.components.mechanisms import slider_crank
@@ -150,7 +151,8 @@ def test_kinematics_command_tells_coordinates_and_writes_results(driven):
 
 def test_inverse_command_tells_what_the_drives_give(driven):
     record = json.loads(run("inverse", driven, "--json"))
-    dynamic = json.loads(run("inverse", driven, "--elastic", "dynamic", "--json"))
+    dynamic = json.loads(run("inverse", driven, "--elastic", "dynamic", "--set", "run.watch=tell", "--json"))
+    assert read_results(driven.with_name("crank.inverse.h5")).head.run["watch"] == "tell"
     main, other = (r["coordinates"]["main.angle"] for r in (record, dynamic))
     assert main["force_unit"] == "N m"
     assert_allclose(main["force_greatest"], other["force_greatest"], rtol=2e-2)

@@ -4,6 +4,7 @@ import csv
 import json
 import logging
 import socket
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -194,6 +195,13 @@ def test_a_note_of_many_points_is_told_once(folder, monkeypatch, caplog):
         assert table.n_known == n_known
         assert [row.notes for row in table.rows][:2] == [("mass 1 is large",), ("mass 2 is large",)]
         assert [text for text in caplog.messages if "large" in text] == ["mass 1 is large (and at 5 more points)"]
+
+
+def test_the_watch_of_the_run_is_that_of_all_points(folder):
+    study = replace(read_study(folder / "study.toml"), analysis="run")
+    for changes, watch in (({}, "stop"), ({"run.watch": "tell"}, "tell")):
+        system, given = read_system(study.system, changes)
+        assert StudyPoint(study).motion(system, given).head.run["watch"] == watch
 
 
 def test_notes_on_two_numbered_bodies_are_both_told(caplog):
