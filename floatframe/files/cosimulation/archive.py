@@ -402,10 +402,10 @@ class FloatframeSlave({base}):
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
+        release_python_at_exit(self.resources)
         if missing:
             print(missing, file=sys.stderr)
             raise ImportError(missing)
-        release_python_at_exit(self.resources)
         self.unit = HostedUnit(self.resources, lambda words: self.log(words, {status}.warning))
 
     @told
