@@ -8,6 +8,7 @@ from .results.sensors.elements import BushingSensor as BushingSensor
 from .results.sensors.elements import ControlSensor as ControlSensor
 from .results.sensors.elements import CouplerSensor as CouplerSensor
 from .results.sensors.elements import ElementSensor as ElementSensor
+from .results.sensors.left_out import LeftOutSensor as LeftOutSensor
 from .results.sensors.loads import EnergySensor as EnergySensor
 from .results.sensors.loads import ModeSensor as ModeSensor
 from .results.sensors.loads import MomentumSensor as MomentumSensor

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
+from cms.body.left_out_modes import LeftOutModes
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.records import ArrayShape, checked_fields, frozen_copies
@@ -50,6 +51,8 @@ class ErrorEstimates:
         "+": these frequencies are too high; "+-": too high or too low.
     mesh_method
         How `mesh` was estimated, or why it is not known.
+    left_out
+        Shapes that the mode set lacks, over the loads of a motion; None: not recorded.
     """
 
     frequency: Annotated[Array, ArrayShape(("n_judged",))]
@@ -64,6 +67,7 @@ class ErrorEstimates:
     mesh: Annotated[Array, ArrayShape((None,), has_nan=True)] = field(default_factory=lambda: np.zeros(0))
     mesh_sign: str = ""
     mesh_method: str = ""
+    left_out: LeftOutModes | None = None
 
     @property
     def distance(self) -> Array:

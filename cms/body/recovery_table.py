@@ -24,7 +24,7 @@ from fe_models.foundation.records import ArrayShape, checked_fields, frozen_copi
 from fe_models.foundation.units import Dimensions, Units, unit_words
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["N_RIGID", "RecoveryTable", "spin_products"]
+__all__ = ["N_RIGID", "RecoveryTable", "spin_accelerations", "spin_change", "spin_products"]
 
 N_RIGID = 6  #: number of coordinates of z before q: three of d and three of theta
 ORDERS = ("position", "velocity", "acceleration")  #: derivatives of z, in the order of `dynamic`

@@ -218,6 +218,11 @@ class ReducedBody(Tabular):
             raise BodyError(
                 f"{where}: {len(self.free_frequencies)} free frequencies, but errors of {len(self.errors.frequency)}"
             )
+        if self.errors is not None and (left_out := self.errors.left_out) is not None:
+            widths["left-out shapes"] = (len(left_out.inertia),)
+            place, n_left = f"{where}: left-out shapes", left_out.n_left
+            require_shape(f"{place}: interfaces", left_out.interfaces, (6, len(self.interfaces), n_left))
+            require_shape(f"{place}: load_cases", left_out.load_cases, (len(self.load_cases), n_left))
         if self.geometric is not None:
             widths["geometric stiffness"] = (self.geometric.n_q,)
             if len(self.geometric.is_loaded) != len(self.interfaces):

@@ -35,12 +35,14 @@ import numpy as np
 import scipy.linalg as la
 
 from cms.body.error_estimates import ErrorEstimates
+from cms.body.reduced_body import BodyFrame
 from cms.errors import BodyError
 from cms.linear_algebra.independent import Products
 from cms.modes.families.families import Families
 from cms.modes.families.receptance import boundary_scale
 from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.free_basis import FreeBasis
+from cms.reduction.left_out_modes import left_out_modes
 from cms.reduction.mesh_error import mesh_errors
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
@@ -85,6 +87,7 @@ class EnlargedSpace:
     mu: Array  #: 1 / omega² of the new shapes, descending, (n_W,)
     Y: Array  #: part of each shape of V, scaled to unit strain energy, in each new shape, (n_V, n_W)
     motion: Array  #: motion in the directions of the loads in the new shapes of unit strain energy, (n_loads, n_W)
+    X: Array  #: corrections, residual responses and random columns, K-orthogonal to V, (n_dof, n_X)
 
 
 def require_one_process(body: FEBody) -> None:
@@ -96,7 +99,9 @@ def require_one_process(body: FEBody) -> None:
         )
 
 
-def error_estimates(families: Families, modes: ModeSet, basis: FreeBasis) -> ErrorEstimates:
+def error_estimates(
+    families: Families, modes: ModeSet, basis: FreeBasis, Phi: Array, frame: BodyFrame
+) -> ErrorEstimates:
     """Estimate the errors of a reduced body with the factorisation of its families.
 
     Parameters
@@ -107,6 +112,10 @@ def error_estimates(families: Families, modes: ModeSet, basis: FreeBasis) -> Err
         The mode set.
     basis
         The free modes in its span.
+    Phi
+        Modes of the reduced body, (n_dof, n_q).
+    frame
+        Its frame.
     """
     frequencies = basis.frequencies()
     vibrating = modes.frequencies[~modes.is_static]
@@ -133,6 +142,7 @@ def error_estimates(families: Families, modes: ModeSet, basis: FreeBasis) -> Err
         mesh=four_digits(mesh.frequency, FREQUENCY_ROUNDING) if mesh.sign else np.zeros(0),
         mesh_sign=mesh.sign,
         mesh_method=mesh.method,
+        left_out=left_out_modes(families, basis, space.X, Phi, frame),
     )
 
 
@@ -167,7 +177,8 @@ def enlarged_space(
     bound = np.sqrt(np.maximum(dots(E, K_E), 0.0) / theta)  # (1)
     subtract(E, V, inner(V, K_E) / omega2[:, None])  # rounding
     X = [E[:, bound > EXACT], independent_part(basis, products, U[:, n:]), *random_columns(families, basis, products)]
-    return EnlargedSpace(bound, *ritz_shapes(basis, np.hstack(X), products, directions))
+    beside = np.hstack(X)
+    return EnlargedSpace(bound, *ritz_shapes(basis, beside, products, directions), beside)
 
 
 def errors_of_modes(basis: FreeBasis, space: EnlargedSpace) -> FrequencyErrors:

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cms.body.error_estimates import ErrorEstimates
 from cms.body.invariants import INERTIA_TERMS, Moments, NodalSums, moments_from_gram
 from cms.body.recovery_table import RecoveryTable
 from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
@@ -294,6 +295,7 @@ def changed_body(
         quadratic=None,  # quadratic modes depend on the reaction of the old frame
         point_stress=None if reduced.point_stress is None else changed_point_stress(reduced.point_stress, change),
         recovery={name: changed_table(table, change) for name, table in reduced.recovery.items()},
+        errors=None if reduced.errors is None else changed_errors(reduced.errors, change),
     )
 
 
@@ -363,6 +365,12 @@ def changed_table(table: RecoveryTable, change: Change) -> RecoveryTable:
     X[:6, 6:] = -change.C @ change.Z
     X[6:, 6:] = change.Z
     return table.changed(X, change.R, change.p)
+
+
+def changed_errors(errors: ErrorEstimates, change: Change) -> ErrorEstimates:
+    """Return the estimated errors, which no frame changes, with the forces on left-out shapes in the new frame."""
+    left_out = errors.left_out
+    return errors if left_out is None else replace(errors, left_out=left_out.changed(change.Z, change.R))
 
 
 def changed_point_stress(points: PointStress, change: Change) -> PointStress:

@@ -175,7 +175,7 @@ def reduce(
         errors = isinstance(source, Families) and source.has_factor
     return replace(
         reduced,
-        errors=errors_of(source, modes, finished) if errors else None,
+        errors=errors_of(source, modes, finished, condition.frame) if errors else None,
         provenance={**reduced.provenance, **{key: words for key, words in told.items() if words}},
         recovery=recovery_of_model(source, in_memory(finished.Phi), condition, reduced, recovery) if recovery else {},
         stress=nodal_stress_modes(body, finished.Phi, kept, condition.frame.axes) if stress else None,
@@ -187,10 +187,10 @@ def reduce(
     )
 
 
-def errors_of(source: FEBody | Families, modes: ModeSet, finished: FinishedBasis) -> ErrorEstimates:
+def errors_of(source: FEBody | Families, modes: ModeSet, finished: FinishedBasis, frame: BodyFrame) -> ErrorEstimates:
     """Return the estimated errors, from a factorisation of its own if the source has none."""
     with families_of(source) as families, one_blas_thread():
-        return error_estimates(families, modes, basis_of_finished(families, finished))
+        return error_estimates(families, modes, basis_of_finished(families, finished), finished.Phi, frame)
 
 
 def assembled(

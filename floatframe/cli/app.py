@@ -238,6 +238,9 @@ def print_run(trajectory: "Trajectory") -> None:
         done += [f"{name} off" for name in event["switch_off"]]
         done += [f"impulse {value:.6g} at {name}" for name, value in event.get("impulse", {}).items()]
         rows.append(("event", f"{event['name']} at {event['t']:.9g} {second}: {', '.join(done) or 'recorded'}"))
+    for name, largest in summary.get("left_out", {}).items():
+        at_most = f"at most {100 * largest['share']:.2g} % of its strain energy"
+        rows.append(("left out by modes", f"body {name!r}: {at_most}, at t = {largest['t']:.6g}"))
     if "wall_time" in summary:
         rows.append(("wall time", f"{summary['wall_time']:.2f} s"))
     rows.append(("energy defect", f"{record['energy_defect']:.2e} of {record['energy_scale']:.6g} {energy}"))

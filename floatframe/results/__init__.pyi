@@ -9,4 +9,5 @@ from .place_motion import interface_motion as interface_motion
 from .place_motion import largest_von_mises as largest_von_mises
 from .place_motion import nodal_stress as nodal_stress
 from .place_motion import point_motion as point_motion
+from .sensors.left_out import LeftOutEnergy as LeftOutEnergy
 from .validity import ValidityNote as ValidityNote

@@ -67,6 +67,7 @@ class SummaryRecord(TypedDict, total=False):
     wall_time: float
     watched: dict[str, float | list[float]]
     events: list[EventRecord]
+    left_out: dict[str, dict[str, float]]
 
 
 @presented

@@ -8,7 +8,7 @@ motion.plot("tip", "pin")                                              # a figur
 motion.to_dataframe("tip", "pin.angle")
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -28,6 +28,7 @@ from floatframe.results.sensor_choice import chosen_measurements, controller_sam
 from floatframe.results.sensor_plots import figure_of, plot_columns, sensor_pages
 from floatframe.results.sensors import coordinate_sensors, measured, measurement_of, sensors_of
 from floatframe.results.sensors.joint_coordinate import JointCoordinate
+from floatframe.results.sensors.left_out import LeftOutEnergy, left_out
 from floatframe.results.sensors.measurement import Measurement
 from floatframe.results.trajectory import BodyMotion, Drift, Reaction, Trajectory
 
@@ -98,6 +99,14 @@ class Motion(Tabular, Trajectory):
             If there is no such controller.
         """
         return controller_samples(self.system, self, name)
+
+    @cached_property
+    def left_out(self) -> Mapping[str, LeftOutEnergy]:
+        """Estimates of the strain energy that the modes of flexible bodies left out, by the name of the body.
+
+        Bodies whose modal files have no left-out shapes are not included.
+        """
+        return left_out(self.system, self)
 
     def measurements(self, *names: str) -> tuple[Measurement, ...]:
         """Return measurements of sensors and coordinates by name, with wildcards * and ?; all if no name is given.

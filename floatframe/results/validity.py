@@ -17,7 +17,7 @@ OF_LAWS = ("frequency", "knots", "law")
 #: kinds of notes on bushings and bearings that rotate beyond the validity of small angles
 OF_ANGLES = ("angles", "tilt")
 OF_ENERGY = ("energy", "damping")  #: kinds of notes about energy that the steps add or remove
-KINDS = (*OF_FRAMES, "steps", *OF_ENERGY, *OF_LAWS, *OF_ANGLES)
+KINDS = (*OF_FRAMES, "steps", "left out", *OF_ENERGY, *OF_LAWS, *OF_ANGLES)
 
 
 @presented
@@ -28,7 +28,8 @@ class ValidityNote:
 
     There is one note per body and kind for the linear frame of a body ("rotation", "load", "speed" or "inertia", fields
     of `cms.body.linear_range.Limits`); one for the steps of the run ("steps": their estimated error relative to the
-    motion); one for energy that the steps add ("energy") and one for energy that they remove ("damping"), relative to
+    motion); one for each body whose modes left out too much of its strain energy ("left out"); one for energy that
+    the steps add ("energy") and one for energy that they remove ("damping"), relative to
     the energy in motion. These name the body most affected. There is one note for each supply, load, drive or user law
     that the steps do not resolve ("frequency", "knots" of a table, "law"), and for each bushing and bearing with large
     angles ("angles", "tilt": the difference between interpretations of the angles). These notes name a place in
@@ -96,6 +97,11 @@ class ValidityNote:
             return (
                 f"the error of the steps is about {100 * self.largest:.2g} % of the motion (limit "
                 f"{100 * self.limit:g} %), estimated by repeating some of them as half steps"
+            )
+        if self.kind == "left out":
+            return (
+                f"its modes left out about {100 * self.largest:.2g} % of its strain energy (limit {100 * self.limit:g} "
+                "%), estimated from the shapes that they lack"
             )
         if self.kind == "energy":
             return (

@@ -42,6 +42,7 @@ from floatframe.results.head import Head
 from floatframe.results.motion import Motion, motion_of
 from floatframe.results.results_file import MemorySource, segments_words, validity_text
 from floatframe.results.sensors import measured
+from floatframe.results.sensors.left_out import left_out_shapes
 from floatframe.results.trajectory import Trajectory, read_trajectory
 from floatframe.results.validity import ValidityNote, notes_from_json, notes_to_json
 from floatframe.results.writer import ResultsPlace, ResultsWriter, last_restart
@@ -69,6 +70,8 @@ TIMES = ("t_start", "t_end", "h", "output_every")  #: attributes of the run in t
 MOST_STEPS = 1e12  #: largest number of steps of a run, which would take months
 MOST_OF_RUN = 0.5  #: fraction of the computing time above which calls of a Python function give a warning
 LONG_CALLS = 1.0  #: shortest computing time of such calls for a warning [s]
+LEFT_OUT_LIMIT = 0.1  #: share of the strain energy that modes may leave out without a note
+LEFT_OUT_ADVICE = "reduce it with more modes, or choose them by their error (cms reduce --error 1e-3 --up-to 500Hz)"
 #: allowed time difference between the start of a run and the end of the run that it continues, as a fraction of a step
 SAME_TIME = 1e-6
 
@@ -313,6 +316,8 @@ def resume(
             events=watch,
             sampling=sampling,
         )  # fmt: skip
+        if again.left_out:
+            again.take_left_out(read_trajectory(place.folder))
         again.steps.restore(record, again.notes)
         again.energy.restore(record, again.notes)
         again.begin(memory, n_done)
@@ -364,9 +369,11 @@ class Run:
         """Return the counters and computing times of the run, and its events."""
         events = {} if self.events is None else {"events": self.events.happened}
         samples = {} if self.sampling is None else {"controllers": self.sampling.summary()}
+        found = {each.body: {"share": each.share, "t": each.t_largest} for each in (s.result() for s in self.left_out)}
         return (
             events
             | samples
+            | ({"left_out": found} if found else {})
             | self.watched()
             | {name: int(getattr(memory, name)) for name in ("n_steps", "n_rejected", "n_iterations")}
             | {"wall_time": self.seconds}
@@ -401,6 +408,7 @@ class Run:
         self.energy = EnergyWatch(self.output_every, self.h)
         self.closed = self.looked = time.monotonic()  # time of the last segment, and of the last check of rows
         self.waiting: list[Rows] = []
+        self.left_out = left_out_shapes(self.system, self.h * self.output_every)
 
     def keep(self, rows: Rows) -> None:
         """Collect result rows, because one check of many rows costs as much as a check of a few."""
@@ -420,11 +428,33 @@ class Run:
         for note in self.watch.observe(rows):
             log.warning("%s", note.words)
         told = rows_of_file(compiled_system(self.system), rows)
+        if self.left_out:
+            self.take_left_out(Trajectory(self.head, MemorySource(joint_rows(self.system, [told])), is_complete=False))
         if self.writer is None:
             self.kept.append(told)
         else:
             self.writer.validity = notes_to_json(self.watch.notes)
             self.writer.append(told)
+
+    def take_left_out(self, trajectory: Trajectory) -> None:
+        """Pass outputs to the left-out shapes of the bodies."""
+        for shapes in self.left_out:
+            shapes.take(trajectory)
+
+    def report_left_out(self) -> None:
+        """Store and log a note for each body whose modes left out too much of its strain energy."""
+        for shapes in self.left_out:
+            found = shapes.result()
+            if found.share > LEFT_OUT_LIMIT:
+                t_first = float(found.t[np.argmax(found.shares > LEFT_OUT_LIMIT)])
+                note = ValidityNote(
+                    found.body, "left out", LEFT_OUT_LIMIT, found.share, t_first, found.t_largest,
+                    advice=LEFT_OUT_ADVICE,
+                )  # fmt: skip
+                self.watch.found[note.key] = note
+                log.warning("system %r: %s", self.system.name, note.words)
+        if self.writer is not None:
+            self.writer.validity = notes_to_json(self.watch.notes)
 
     def report(self, *new: ValidityNote | None) -> None:
         """Store the notes about step size and energy, and log new ones."""
@@ -598,6 +628,7 @@ class Run:
     def finished(self, memory: Memory) -> Motion:
         """Return the motion after all its steps have been stored."""
         self.look()
+        self.report_left_out()
         self.report_costs()
         if self.writer is None:
             head = replace(self.head, summary=self.summary(memory))

@@ -210,12 +210,12 @@ def renamed(body: ReducedBody, rng: np.random.Generator) -> ReducedBody | None:
     return replace(body, interfaces=(replace(body.interfaces[0], name="pin of another"), *body.interfaces[1:]))
 
 
-def without(field: str, value: Any = None) -> Corruption:
-    """The body without a part that it was asked to hold."""
+def without(field: str, value: Any = None, **more: Any) -> Corruption:
+    """The body without a part that it was asked to hold, and with other fields that have to fit."""
 
     def change(body: ReducedBody, rng: np.random.Generator) -> ReducedBody | None:
         own = getattr(body, field)
-        return None if own is None or not len(own) else replace(body, **{field: value})
+        return None if own is None or not len(own) else replace(body, **{field: value}, **more)
 
     return change
 
@@ -385,7 +385,7 @@ CORRUPTIONS: dict[str, tuple[str, Corruption]] = {
     "load case: torque of wrong sign": ("load-cases", of("load_cases.torque", times(-1.0))),
     "load case renamed": ("load-cases", of("load_cases.name", lambda x, rng: "another")),
     "load case of another kind": ("load-cases", of("load_cases.kind", lambda x, rng: "pressure of another")),
-    "load cases left out": ("load-cases", without("load_cases", ())),
+    "load cases left out": ("load-cases", without("load_cases", (), errors=None)),
     "triad turned by 90 degrees": ("interfaces", of("interfaces.triad", turned)),
     "triads exchanged": ("interfaces", exchanged_interfaces("triad")),
     "interface motions exchanged": ("interfaces", exchanged_interfaces("Psi")),
@@ -420,6 +420,9 @@ CORRUPTIONS: dict[str, tuple[str, Corruption]] = {
     "nodal sums of the modes": ("nodal-sums", sums_of_modes("U1")),
     "nodal sums of turning modes": ("nodal-sums", sums_of_modes("U2")),
     "errors of the frequencies a tenth": ("error-estimates", of("errors.frequency", times(0.1))),
+    "loads on left-out shapes a tenth": ("error-estimates", of("errors.left_out.interfaces", times(0.1))),
+    "inertia of left-out shapes a tenth": ("error-estimates", of("errors.left_out.inertia", times(0.1))),
+    "left-out shapes too slow": ("error-estimates", of("errors.left_out.mass", times(4.0))),
     "errors of the statics none": ("error-estimates", of("errors.inertia", times(0.0))),
     "labels of the modes shuffled": ("sources", exchanged_labels),
     "energy shares shuffled": ("sources", of("energy_shares", shuffled(0))),

@@ -127,6 +127,7 @@ def errors_record(errors: ErrorEstimates) -> dict[str, Any]:
         "mesh": [_finite(error) for error in errors.mesh],
         "mesh_sign": errors.mesh_sign,
         "mesh_method": errors.mesh_method,
+        "n_left_out": None if errors.left_out is None else errors.left_out.n_left,
     }
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from cms.body.error_estimates import ErrorEstimates
 from cms.body.geometric_stiffness import UNIT_LOADS, GeometricStiffness, RotatedLoads, SpreadLoads
 from cms.body.invariants import Moments
 from cms.body.modal_file.contents import Attribute, Content, Contents, Dataset
@@ -109,7 +110,9 @@ def items_of(body: ReducedBody) -> dict[str, tuple[Any, ...]]:
         "/units": (body.units,), "/frame": (body.frame,), "/modes": (body,), "/nodes": (body,), "/surface": (body,),
         "/interfaces/<i>": body.interfaces, "/load_cases/<i>": body.load_cases,
     }  # fmt: skip
+    left_out = None if body.errors is None else body.errors.left_out
     parts = {"/kept": body.kept, "/columns": body.columns, "/errors": body.errors, "/nodal_sums": body.nodal_sums,
+             "/errors/left_out": left_out,
              "/stress/points": body.point_stress, "/quadratic": None if body.quadratic is None else body}  # fmt: skip
     several = {"/sets/<i>": body.numbering.sets, "/recovery/<i>": tuple(body.recovery.values())}
     return (
@@ -152,7 +155,7 @@ def body_of(content: Content) -> ReducedBody:
         provenance={name: str(value) for name, value in content.attributes.get("/provenance", {}).items()},
         columns=part("/columns") if has("/columns") else None,
         nodal_sums=part("/nodal_sums") if has("/nodal_sums") else None,
-        errors=part("/errors") if has("/errors") else None,
+        errors=errors_of(contents) if has("/errors") else None,
         load_cases=items_in(contents, "/load_cases"),
         stress=contents.value("/stress/nodal") if has("/stress", "has_nodal") else None,
         point_stress=part("/stress/points") if has("/stress", "has_points") else None,
@@ -206,6 +209,12 @@ def fields_of(contents: Contents, group: str, k: int = 0) -> dict[str, Any]:
         if name not in layout.follows
     }
     return attributes | datasets
+
+
+def errors_of(contents: Contents) -> ErrorEstimates:
+    """Return the estimated errors, with the left-out shapes if the file has them."""
+    left_out = item_of(contents, "/errors/left_out") if contents.has("/errors/left_out") else None
+    return replace(item_of(contents, "/errors"), left_out=left_out)
 
 
 def numbering_of(contents: Contents) -> Numbering:

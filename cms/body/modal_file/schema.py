@@ -16,6 +16,7 @@ import numpy as np
 from cms.body.error_estimates import ErrorEstimates
 from cms.body.invariants import NodalSums
 from cms.body.kept_points import KeptPoints
+from cms.body.left_out_modes import LeftOutModes
 from cms.body.modal_file.contents import Content, Contents, Dataset
 from cms.body.recovery_table import RecoveryTable
 from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
@@ -165,6 +166,27 @@ ENTRIES = {
     "/errors/mesh": Entry(
         "(n_judged,)", "estimated relative error of these frequencies of the finite element model by its mesh; NaN: "
         "not known; 10: 10 or more",
+    ),
+    "/errors/left_out/mass": Entry(
+        "(n_shapes,)", "1 / omega^2 of each vibration shape of modes and left-out shapes together; 0: massless",
+        Dimensions(0, 0, 2),
+    ),
+    "/errors/left_out/shares": Entry("(n_left, n_shapes)", "part of each left-out shape in each vibration shape"),
+    "/errors/left_out/inertia": Entry(
+        "(n_q, n_left)", "-Phi.T M W, force on each left-out shape by modal accelerations; W.T K W = 1, W.T K Phi = 0",
+        Dimensions(0, 0, 1),
+    ),
+    "/errors/left_out/interfaces": Entry(
+        "(6, n_interfaces, n_left)",
+        "force on each left-out shape by a unit force (0-2) and moment (3-5) on each interface, axes of B",
+        Dimensions(-0.5, 0, 1), Dimensions(-0.5, -1, 1),
+    ),
+    "/errors/left_out/spin": Entry(
+        "(6, n_left)", "force on each left-out shape by products of angular velocities (xx yy zz xy yz zx)",
+        Dimensions(0.5, 1, 1),
+    ),
+    "/errors/left_out/load_cases": Entry(
+        "(n_cases, n_left)", "force on each left-out shape by each load case", Dimensions(0.5, 1, -1),
     ),
     "/nodal_sums/w": Entry("()", "sum over the nodes of their weight w, the volume each stands for", VOLUME),
     "/nodal_sums/S": Entry("(3,)", "sum of w c_a", Dimensions(0, 4)),
@@ -350,6 +372,7 @@ GROUPS = {
         {"method": str, "date": str, "mesh_sign": str, "mesh_method": str},
         if_any=("response", "interface_loads", "mesh", "mesh_sign", "mesh_method"),
     ),
+    "/errors/left_out": Group(LeftOutModes),
     "/nodal_sums": Group(NodalSums, {"is_volume": bool}),
     "/quadratic": Group(ReducedBody, names={"g": "quadratic"}),
     "/stress/points": Group(PointStress, names={"position": "positions"}),

@@ -152,7 +152,7 @@ def on_q_alone(forces: Array, *, held: bool) -> Array:
     return forces
 
 
-def loads_of_model(body: FEBody, frame: BodyFrame, request: RecoveryRequest) -> tuple[LoadColumns, Array]:
+def loads_of_model(body: FEBody, frame: BodyFrame, loads_at: Iterable[str | int] = ()) -> tuple[LoadColumns, Array]:
     """Return the loads on a finite element body, and their forces on its dofs, (n_dof, n_loads)."""
     columns, forces = _Columns(), []
     turn = np.kron(np.eye(2), frame.axes)
@@ -171,7 +171,7 @@ def loads_of_model(body: FEBody, frame: BodyFrame, request: RecoveryRequest) -> 
         columns.add((f"load case {case.name}",), ((0.0, 0.0, 0.0),))
         forces.append(np.asarray(case.f)[:, None])
     places = Places(body)
-    for at in request.loads_at:
+    for at in loads_at:
         for node in places.nodes(at).tolist():
             matrix, components = node_rows(body, node)
             for first, words, dimensions in ((0, WRENCH[:3], FORCE), (3, WRENCH[3:], MOMENT)):

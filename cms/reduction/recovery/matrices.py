@@ -160,7 +160,7 @@ def recovery_of_model(
     with families_of(source) as families:
         for request in wanted:
             blocks = [None if rows.quantity in OF_INTERFACES else model_block(body, rows) for rows in request.rows]
-            loads, F = loads_of_model(body, frame, request)
+            loads, F = loads_of_model(body, frame, request.loads_at)
             residual = np.zeros((body.n_dof, 0))
             if any(block is not None and not block.order for block in blocks):
                 residual = residual_response(families, condition, Phi, reduced.K, np.hstack([F, -(body.M @ motion)]))

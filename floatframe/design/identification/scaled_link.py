@@ -79,5 +79,6 @@ def scaled_body(reduced: ReducedBody, mass: float, stiffness: float) -> ReducedB
         if made.point_stress is None
         else replace(made.point_stress, modes=made.point_stress.modes * ratio),
         load_cases=loads,
+        errors=None if made.errors is None else replace(made.errors, left_out=None),
         provenance=dict(reduced.provenance) | {"scaled": f"mass {mass:.9g}, stiffness {stiffness:.9g}"},
     )

@@ -16,6 +16,7 @@ from floatframe.results.sensors.body_loads import InterfaceForceSensor, Recovery
 from floatframe.results.sensors.channels import Channel, StressChannel
 from floatframe.results.sensors.elements import BushingSensor, ControlSensor, CouplerSensor, ElementSensor
 from floatframe.results.sensors.joint_coordinate import JointCoordinate
+from floatframe.results.sensors.left_out import LeftOutSensor
 from floatframe.results.sensors.loads import EnergySensor, ModeSensor, MomentumSensor, ReactionSensor
 from floatframe.results.sensors.measurement import Measurement, Sensor, owner_and_column
 from floatframe.results.sensors.places import (
@@ -50,6 +51,7 @@ __all__ = [
     "EnergySensor",
     "InterfaceForceSensor",
     "JointCoordinate",
+    "LeftOutSensor",
     "Measurement",
     "ModeSensor",
     "MomentumSensor",
@@ -94,6 +96,7 @@ SENSORS: Registry[type[Sensor]] = Registry(
         "elongation": ElongationSensor,
         "energy": EnergySensor,
         "interface-force": InterfaceForceSensor,
+        "left-out": LeftOutSensor,
         "mode": ModeSensor,
         "momentum": MomentumSensor,
         "reaction": ReactionSensor,

@@ -30,7 +30,7 @@ from floatframe.results.small_motions.rows import LinearColumns, Rows, joined
 from floatframe.results.small_motions.small_motions import SmallMotions
 from floatframe.results.trajectory import Trajectory
 
-__all__ = ["InterfaceForceSensor", "RecoverySensor", "SpringSensor"]
+__all__ = ["InterfaceForceSensor", "RecoverySensor", "SpringSensor", "case_amplitudes", "interface_loads"]
 
 ROUNDING = 1e-12  #: magnitude, relative to the largest wrench, below which a value is a rounding error
 
@@ -380,11 +380,22 @@ class RecoverySensor:
             elif component in SIX and name in interface_names(body):
                 p[:, column] = on_interfaces[interface_names(body).index(name), :, SIX.index(component)]
             elif load.startswith("load case "):
-                cases = [force for force in system.forces if isinstance(force, BodyLoad)]
-                for force, acted in zip(cases, load_cases(system, trajectory).T, strict=True):
-                    if load == f"load case {force.load_case}" and named(force.body) == body.name:
-                        p[:, column] += acted
+                names = [f"load case {case.name}" for case in body.reduced.load_cases]
+                if load in names:
+                    p[:, column] = case_amplitudes(system, trajectory, body)[:, names.index(load)]
         return p
+
+
+def case_amplitudes(system: System, trajectory: Trajectory, body: FlexibleBody) -> Array:
+    """Return the amplitudes of the load cases of a body over time, (n_t, n_cases)."""
+    names = [case.name for case in body.reduced.load_cases]
+    p = np.zeros((len(trajectory.t), len(names)))
+    cases = [force for force in system.forces if isinstance(force, BodyLoad)]
+    if cases:
+        for force, acted in zip(cases, load_cases(system, trajectory).T, strict=True):
+            if named(force.body) == body.name and force.load_case in names:
+                p[:, names.index(force.load_case)] += acted
+    return p
 
 
 def load_cases(system: System, trajectory: Trajectory) -> Array:

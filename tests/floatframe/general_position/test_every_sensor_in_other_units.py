@@ -43,6 +43,7 @@ from floatframe.results.sensors import (
     ElongationSensor,
     EnergySensor,
     InterfaceForceSensor,
+    LeftOutSensor,
     ModeSensor,
     MomentumSensor,
     PlaceSensor,
@@ -78,8 +79,9 @@ def rod():
     part = cms.couple(with_interfaces(beam(n=3), *ends))
     rows = (cms.reduction.Rows("acceleration", at=("right",)), cms.reduction.Rows("net force", about=(0.1, 0.2, 0.0)))
     reduced = cms.reduce(
-        part, cms.craig_bampton(part, n_modes=4), recovery=[cms.reduction.RecoveryRequest("table", rows=rows)]
-    )
+        part, cms.craig_bampton(part, n_modes=4), recovery=[cms.reduction.RecoveryRequest("table", rows=rows)],
+        errors=True,
+    )  # fmt: skip
     stress = 1e9 * np.random.default_rng(4).normal(size=(len(reduced.nodes), 6, reduced.n_q))
     return replace(reduced, stress=stress)
 
@@ -139,6 +141,7 @@ def sensors():
         ElongationSensor("elongation", "rod", np.array([0.0, 0, 0]), np.array([1.0, 0, 0])),
         EnergySensor("energy"),
         InterfaceForceSensor("interface", "rod", "right"),
+        LeftOutSensor("left out", "rod"),
         ModeSensor("mode", "rod", 2),
         MomentumSensor("momentum"),
         ReactionSensor("reaction", "knee", "marker"),

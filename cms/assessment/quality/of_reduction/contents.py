@@ -21,6 +21,7 @@ from cms.assessment.quality.of_reduction.full_shapes import FullShapes, finished
 from cms.assessment.quality.record import QualityRecord, information, judge
 from cms.body.geometric_stiffness import UNIT_LOADS
 from cms.body.invariants import known_P, known_S_kl
+from cms.body.left_out_modes import LeftOutModes
 from cms.body.recovery_table import N_RIGID, RecoveryTable
 from cms.body.reduced_body import ReducedBody
 from cms.body.source_columns import SourceColumns
@@ -305,7 +306,7 @@ def compare_errors(case: Case) -> Iterator[Compared]:
     file = case.reduced.errors
     if file is None:
         return
-    expected = error_estimates(case.families, case.modes, case.basis)
+    expected = error_estimates(case.families, case.modes, case.basis, case.Phi, case.reduced.frame)
     names = ["method", "interface_loads"] + (["mesh_sign", "mesh_method"] if file.mesh_method else [])
     for name in names:
         yield same(f"errors.{name}", getattr(file, name), getattr(expected, name))
@@ -319,6 +320,22 @@ def compare_errors(case: Case) -> Iterator[Compared]:
     for name in ("interface", "inertia"):
         got, wanted = (np.nan_to_num(getattr(each, name), nan=-1.0) for each in (file, expected))
         yield apart(f"errors.{name}", got, wanted, np.abs(wanted) + STATIC_ROUNDING, axes="load")
+    if file.left_out is not None and expected.left_out is not None:
+        yield from compare_left_out(file.left_out, expected.left_out)
+    elif file.left_out is not None:
+        yield Compared("errors.left_out.mass", np.inf, "", "the modes of the model leave nothing out")
+
+
+def compare_left_out(file: LeftOutModes, expected: LeftOutModes) -> Iterator[Compared]:
+    """Compare left-out shapes, which are unique up to a rotation, by the energies that their loads leave out."""
+    yield apart("errors.left_out.mass", file.mass, expected.mass, float(expected.mass.max()), axes="shape")
+    a, b = ((each.shares * each.mass) @ each.shares.T for each in (file, expected))
+    a, b = file.inertia @ a @ file.inertia.T, expected.inertia @ b @ expected.inertia.T
+    yield apart("errors.left_out.shares", a, b, float(np.abs(b).max(initial=0.0)) or 1.0, axes="mode mode")
+    for name in ("inertia", "interfaces", "spin", "load_cases"):
+        x, y = (getattr(each, name).reshape(-1, each.n_left) for each in (file, expected))
+        largest = float((y**2).sum(axis=1).max(initial=0.0))
+        yield apart(f"errors.left_out.{name}", x @ x.T, y @ y.T, largest or 1.0, axes="load load")
 
 
 # Inertia and damping --------------------------------------------------------------------------------------------------

@@ -121,6 +121,12 @@ FIELDS: Mapping[str, str] = {
     "errors.mesh_sign": "error-estimates",
     "errors.mesh_method": "error-estimates",
     "errors.date": "error-estimates",
+    "errors.left_out.mass": "error-estimates",
+    "errors.left_out.shares": "error-estimates",
+    "errors.left_out.inertia": "error-estimates",
+    "errors.left_out.interfaces": "error-estimates",
+    "errors.left_out.spin": "error-estimates",
+    "errors.left_out.load_cases": "error-estimates",
 }
 
 
