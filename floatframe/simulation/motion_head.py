@@ -1,7 +1,9 @@
 """The description of a motion in its results: the head, and the datasets of a motion in memory."""
 
 from dataclasses import asdict
+from functools import cache, lru_cache
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 
 import numpy as np
 
@@ -45,10 +47,6 @@ def head_of(system: System, integrator: Integrator, t_start: float, t_end: float
                 isinstance(body, FlexibleBody) and body.is_stiffened,
             )
         )
-    try:
-        release = version("floatframe")
-    except PackageNotFoundError:
-        release = "unknown"
     run = {
         "integrator": type(integrator).__name__,
         **asdict(integrator),  # type: ignore[call-overload]
@@ -61,7 +59,7 @@ def head_of(system: System, integrator: Integrator, t_start: float, t_end: float
         "system_file_digest": file_digest(system.source),
         "changes": dict(system.changes),
         "digest": system_digest(system, integrator),
-        "floatframe": release,
+        "floatframe": release(),
     }
     return Head(
         system.name,
@@ -81,6 +79,22 @@ def digest_of(source: str) -> str:
     """Return the digest of a modal file, or "" for a body that was created in memory."""
     if not source:
         return ""
+    state = Path(source).stat() if Path(source).exists() else None
+    return digest_of_state(source, None if state is None else (state.st_size, state.st_mtime_ns, state.st_ino))
+
+
+@lru_cache(maxsize=64)  # many runs have bodies of the same files
+def digest_of_state(source: str, state: tuple[int, int, int] | None) -> str:
+    """Return the digest of a modal file; `state`: its size, time of change and inode, which a changed file changes."""
     from cms.body.modal_file.file import digest
 
     return digest(source)
+
+
+@cache
+def release() -> str:
+    """Return the version of the installed program."""
+    try:
+        return version("floatframe")
+    except PackageNotFoundError:
+        return "unknown"

@@ -311,12 +311,14 @@ def described(source: Source, parameters: Sequence[str] | Mapping[str, Any]):
     if isinstance(source, System):
         at = {name: value_at(source, path) for name, path in paths.items()}
         return (lambda name, value: with_value(source, paths[name], value)), source, paths, at
+    from floatframe.files.system_file.bodies import ReadBodies
     from floatframe.files.system_file.read_system import read_system
 
     path_of_file = os.fspath(source)
     at = numbers_of_file(path_of_file, paths)
-    make = lambda name, value: read_system(path_of_file, {paths[name]: value})[0]  # noqa: E731
-    return make, read_system(path_of_file)[0], paths, at
+    bodies: ReadBodies = {}
+    make = lambda name, value: read_system(path_of_file, {paths[name]: value}, read_bodies=bodies)[0]  # noqa: E731
+    return make, read_system(path_of_file, read_bodies=bodies)[0], paths, at
 
 
 def numbers_of_file(path_of_file: str, paths: Mapping[str, str]) -> dict[str, float]:

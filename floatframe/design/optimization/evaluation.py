@@ -1,7 +1,7 @@
 """One evaluation of a design: the values of objectives and constraints, or the reason why they do not exist."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from floatframe.analyses.linear.system_modes import system_modes
 from floatframe.design.optimization.design import Design, Quantity
 from floatframe.design.studies.study import StudyPoint, column_of, output_value, output_value_of_modes
 from floatframe.errors import ModelError, ResultsError
+from floatframe.files.system_file.bodies import ReadBodies
 from floatframe.model.system import System
 from floatframe.results.trajectory import Trajectory
 
@@ -127,6 +128,7 @@ class EvaluationFunction:
     """The function that computes an evaluation; it can be sent to another process."""
 
     design: Design
+    read_bodies: ReadBodies = field(default_factory=dict, compare=False, repr=False)  #: kept from call to call
 
     def __call__(self, values: tuple[float, ...]) -> Evaluation:
         """Return the numbers at these values of the parameters."""
@@ -140,7 +142,8 @@ class EvaluationFunction:
         from floatframe.files.system_file.run_section import formulation_of
 
         design = self.design
-        system, given = read_system(design.study.system, design.study.changes(design.point(values)))
+        changes = design.study.changes(design.point(values))
+        system, given = read_system(design.study.system, changes, read_bodies=self.read_bodies)
         found: dict[str, Any] = {}
         if {"modes", "response"} & set(design.analyses):
             found["response"] = linear = linearize(system, formulation=formulation_of(given))

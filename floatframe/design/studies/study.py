@@ -8,7 +8,7 @@ import logging
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,7 @@ from floatframe.design.studies.study_file import TAKES, Output, Study
 from floatframe.engine.compiling.file_frames import state_of_file
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import ModelError, ResultsError
+from floatframe.files.system_file.bodies import ReadBodies
 from floatframe.files.system_file.run_section import RunOptions, formulation_of, required_run
 from floatframe.model.system import System
 from floatframe.results.sensors import measurement_of
@@ -252,13 +253,14 @@ class StudyPoint:
     """The function that computes a point, which can be sent to another process."""
 
     study: Study
+    read_bodies: ReadBodies = field(default_factory=dict, compare=False, repr=False)  #: kept from point to point
 
     def __call__(self, point: tuple[Any, ...]) -> StudyRow:
         """Return the row of a point."""
         from floatframe.files.system_file.read_system import read_system
 
         with recorded_notes() as notes:
-            system, given = read_system(self.study.system, self.study.changes(point))
+            system, given = read_system(self.study.system, self.study.changes(point), read_bodies=self.read_bodies)
             if self.study.analysis == "modes":
                 modes = system_modes(linearize(system, formulation=formulation_of(given)))
                 found = [output_value_of_modes(output, modes, 1 / system.units.time) for output in self.study.outputs]

@@ -28,7 +28,7 @@ from floatframe.model.system import Body
 if TYPE_CHECKING:
     from cms.reduction.parametric.parametric_body import ParametricBody
 
-__all__ = ["BodySection", "body_of"]
+__all__ = ["BodySection", "ReadBodies", "body_of"]
 
 log = logging.getLogger(__name__)
 
@@ -123,7 +123,13 @@ class BodySection(Table):
         return self
 
 
-def body_of(name: str, section: BodySection, files: dict[Any, ReducedBody], units: Units) -> Body:
+#: digest and body of each modal file, which a task that reads many systems keeps from one to the next
+ReadBodies = dict[Path, tuple[str, ReducedBody]]
+
+
+def body_of(
+    name: str, section: BodySection, files: dict[Any, ReducedBody], units: Units, read_bodies: ReadBodies | None = None
+) -> Body:
     """Return the body of a table, in the given units; a modal file is read once for all its instances."""
     if section.euler_parameters is not None:
         orientation = np.array(section.euler_parameters)
@@ -141,7 +147,7 @@ def body_of(name: str, section: BodySection, files: dict[Any, ReducedBody], unit
         return RigidBody(name, **rigid_mass(section).arguments, **motion)
     if source_key(section) not in files:
         try:
-            reduced = reduced_of(name, section)
+            reduced = reduced_of(name, section, read_bodies)
             files[source_key(section)] = convert_units(reduced, units)
         except CmsError as error:
             raise ModelError(f"bodies.{name}.file: {error}") from error
@@ -167,11 +173,16 @@ def source_key(section: BodySection) -> Any:
     return section.file if section.at is None else (section.file, repr(sorted(section.at.items())))
 
 
-def reduced_of(name: str, section: BodySection) -> ReducedBody:
+def reduced_of(name: str, section: BodySection, read_bodies: ReadBodies | None) -> ReducedBody:
     """Return the body of the modal file, or of the family at its parameters."""
     assert section.file is not None  # ensured by the caller
     if section.at is None:
-        return read(section.file)
+        if read_bodies is None:
+            return read(section.file)
+        digest = file_digest(section.file)
+        if section.file not in read_bodies or read_bodies[section.file][0] != digest:
+            read_bodies[section.file] = (digest, read(section.file))
+        return read_bodies[section.file][1]
     family = family_of(section.file, file_digest(section.file))
     try:
         return family.at(**section.at)

@@ -27,7 +27,7 @@ from fe_models.foundation.units import UNIT_SYSTEMS, unit_system
 from fe_models.foundation.words import nearest
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import FloatframeError, SystemFileError
-from floatframe.files.system_file.bodies import BodySection, body_of
+from floatframe.files.system_file.bodies import BodySection, ReadBodies, body_of
 from floatframe.files.system_file.channel_section import (
     CosimulationSection,
     EventSection,
@@ -171,7 +171,10 @@ class SystemFile(Table):
 
 
 def read_system(
-    path: str | os.PathLike[str], changes: Mapping[str, Any] | None = None
+    path: str | os.PathLike[str],
+    changes: Mapping[str, Any] | None = None,
+    *,
+    read_bodies: ReadBodies | None = None,
 ) -> tuple[System, RunOptions | None]:
     """Read and validate a system file and its modal files; return the system and, if there is a table [run], its run.
 
@@ -182,6 +185,9 @@ def read_system(
     changes
         Values that replace those in the file: of its parameters by name, of other keys by key path, such as
         {"length": 0.4, "bodies.rod.mass": 2.0}.
+    read_bodies
+        Bodies of modal files, empty at first. A caller that reads many systems passes the same dict to each call, so
+        that a modal file is read again only if its content has changed.
 
     Raises
     ------
@@ -195,7 +201,9 @@ def read_system(
     files: dict[Any, ReducedBody] = {}
     try:
         units = unit_system(data.system.units)
-        bodies = [body_of(name, section, files, units) for name, section in data.bodies.items()]
+        bodies = [body_of(name, section, files, units, read_bodies) for name, section in data.bodies.items()]
+        for file in set(read_bodies or ()) - {section.file for section in data.bodies.values()}:
+            del read_bodies[file]  # type: ignore[index]
         signals = signal_functions(data.signals, units)
         joints = [joint_of(name, section, signals) for name, section in data.joints.items()]
         couplers = [coupler_of(name, section, signals) for name, section in data.couplers.items()]
