@@ -14,8 +14,8 @@ from pathlib import Path
 from fe_models.foundation.words import damage, nearest
 
 __all__ = [
-    "bytes_of", "file_digest", "file_identity", "is_stream", "near_file", "reading", "remove_parts", "replace_file",
-    "replace_files", "same_file", "sync_folder",
+    "bytes_of", "file_digest", "file_identity", "file_state", "is_stream", "near_file", "reading", "remove_parts",
+    "replace_file", "replace_files", "same_file", "sync_folder",
 ]  # fmt: skip
 
 OWN_DESCRIPTOR = re.compile(r"/(?:dev|proc/self)/fd/(\d{1,6})")
@@ -92,6 +92,15 @@ def file_digest(path: str | Path) -> str:
         return ""
     with Path(path).open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def file_state(path: str | Path) -> tuple[int, int, int] | None:
+    """Return size, time of the last change and number of a file, which tell a changed file; None: there is none."""
+    try:
+        found = os.stat(path)
+    except OSError:
+        return None
+    return found.st_size, found.st_mtime_ns, found.st_ino
 
 
 def own_descriptor(path: Path) -> int | None:

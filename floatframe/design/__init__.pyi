@@ -5,6 +5,8 @@ from .generation.generate import generate as generate
 from .generation.units.generated_unit import generate_fmu as generate_fmu
 from .gradients.sensitivities import Sensitivities as Sensitivities
 from .gradients.sensitivities import sensitivities as sensitivities
+from .many_runs import ManyRuns as ManyRuns
+from .many_runs import integrate_many as integrate_many
 from .optimization.design_file import read_design as read_design
 from .optimization.optimize import optimize as optimize
 from .studies.study import run_study as run_study

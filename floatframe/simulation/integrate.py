@@ -58,7 +58,7 @@ from floatframe.simulation.step_advice import frequency_words, knot_words, step_
 from floatframe.simulation.step_watch import WATCHES, StepWatch
 from floatframe.simulation.validity_watch import ValidityWatch
 
-__all__ = ["Progress", "integrate", "resume"]
+__all__ = ["Progress", "checked_times", "integrate", "number_of_steps", "resume"]
 
 log = logging.getLogger(__name__)
 
@@ -175,16 +175,8 @@ def integrate(
         raise ModelError(
             f"integrate: watch: expected one of {', '.join(WATCHES)}, got {watch!r}{nearest(watch, WATCHES)}"
         )
-    t_start, t_end = number("integrate: t_start", t_start), number("integrate: t_end", t_end)
-    h = number("integrate: h", h, above=0.0)
+    t_start, t_end, h = checked_times(t_start, t_end, h)
     integrator = in_formulation(made_integrator(integrator), formulation)
-    if t_end <= t_start:
-        raise ModelError(f"integrate: expected t_end above t_start = {t_start:g}, got {t_end:g}")
-    if h > (t_end - t_start) * (1 + 1e-9):
-        raise ModelError(
-            f"integrate: h: expected at most the time from {t_start:g} to t_end = {t_end:g}, got {h:g}; "
-            f"are t_end and h swapped?"
-        )
     if output_every < 1 or batch_steps < 1:
         raise ModelError(
             f"integrate: expected output_every and batch_steps of at least 1, got {output_every} and {batch_steps}"
@@ -240,6 +232,20 @@ def require_no_units(system: System) -> None:
             f"system {system.name!r} is coupled to units of other programs (fmus: {names}): use floatframe run, or "
             "floatframe.files.co_simulate in place of integrate; such a run cannot be resumed"
         )
+
+
+def checked_times(t_start: float, t_end: float, h: float) -> tuple[float, float, float]:
+    """Return start, end and step of a run as numbers; `ModelError` if there is no such run."""
+    t_start, t_end = number("integrate: t_start", t_start), number("integrate: t_end", t_end)
+    h = number("integrate: h", h, above=0.0)
+    if t_end <= t_start:
+        raise ModelError(f"integrate: expected t_end above t_start = {t_start:g}, got {t_end:g}")
+    if h > (t_end - t_start) * (1 + 1e-9):
+        raise ModelError(
+            f"integrate: h: expected at most the time from {t_start:g} to t_end = {t_end:g}, got {h:g}; "
+            f"are t_end and h swapped?"
+        )
+    return t_start, t_end, h
 
 
 def number_of_steps(t_start: float, t_end: float, h: float) -> int:

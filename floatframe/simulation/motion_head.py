@@ -3,11 +3,10 @@
 from dataclasses import asdict
 from functools import cache, lru_cache
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 
 import numpy as np
 
-from fe_models.foundation.paths import file_digest
+from fe_models.foundation.paths import file_digest, file_state
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.kernels.memory import Rows
 from floatframe.integrators.integrator import Integrator
@@ -79,13 +78,12 @@ def digest_of(source: str) -> str:
     """Return the digest of a modal file, or "" for a body that was created in memory."""
     if not source:
         return ""
-    state = Path(source).stat() if Path(source).exists() else None
-    return digest_of_state(source, None if state is None else (state.st_size, state.st_mtime_ns, state.st_ino))
+    return digest_of_state(source, file_state(source))
 
 
 @lru_cache(maxsize=64)  # many runs have bodies of the same files
-def digest_of_state(source: str, state: tuple[int, int, int] | None) -> str:
-    """Return the digest of a modal file; `state`: its size, time of change and inode, which a changed file changes."""
+def digest_of_state(source: str, _: tuple[int, int, int] | None) -> str:
+    """Return the digest of a modal file in a state, see `file_state`."""
     from cms.body.modal_file.file import digest
 
     return digest(source)

@@ -23,7 +23,18 @@ from floatframe.model.system import System
 from floatframe.results.head import Head
 from floatframe.simulation.motion_head import head_of
 
-__all__ = ["Family", "Neighbour", "Parameter", "Source", "family_of", "size_beside", "value_at", "with_value"]
+__all__ = [
+    "Family",
+    "Neighbour",
+    "Parameter",
+    "Source",
+    "family_of",
+    "has_same_topology",
+    "size_beside",
+    "topology_error",
+    "value_at",
+    "with_value",
+]
 
 
 # numbers of a system by key path, such as "bodies.rod.mass" or "joints.pin.marker_b.position.0" -----------------------
@@ -374,7 +385,9 @@ def with_neighbours(
                 first = first or error
                 continue
             for each in around:
-                require_same_topology(compiled, each.compiled, path)
+                if not has_same_topology(compiled, each.compiled):
+                    raise topology_error(path, "it has no derivative")
+                require_same_directions(compiled, each.compiled, path)
             return Parameter(name, path, value, factor * step, stencil, around)
     raise ModelError(f"parameter {path!r}: no system exists near {value:.6g}: {first}") from first
 
@@ -385,8 +398,8 @@ def neighbour(system: System) -> Neighbour:
     return Neighbour(system, compiled, new_work(compiled.model))
 
 
-def require_same_topology(compiled: CompiledSystem, other: CompiledSystem, path: str) -> None:
-    """Raise `ModelError` unless both have the same bodies, modes, connections and rows, row by row."""
+def has_same_topology(compiled: CompiledSystem, other: CompiledSystem) -> bool:
+    """Whether both have the same bodies, modes, connections and rows, row by row."""
     own, its = compiled.model, other.model
     pairs = [
         (own.bodies.n_q, its.bodies.n_q), (own.connections.size, its.connections.size),
@@ -395,11 +408,20 @@ def require_same_topology(compiled: CompiledSystem, other: CompiledSystem, path:
         (own.joint_forces.table, its.joint_forces.table), (own.users.n_states, its.users.n_states),
     ]  # fmt: skip
     names = (compiled.body_names, compiled.connection_names) == (other.body_names, other.connection_names)
-    if not names or any(not np.array_equal(a, b) for a, b in pairs):
-        raise ModelError(
-            f"parameter {path!r} changes the topology of the system (its bodies, modes, joints or constraints), so "
-            "that motions before and after cannot be compared; it has no derivative"
-        )
+    return names and all(np.array_equal(a, b) for a, b in pairs)
+
+
+def topology_error(path: str, consequence: str) -> ModelError:
+    """Return the error about a parameter that changes the topology of its system."""
+    return ModelError(
+        f"parameter {path!r} changes the topology of the system (its bodies, modes, joints or constraints), so "
+        f"that motions before and after cannot be compared; {consequence}"
+    )
+
+
+def require_same_directions(compiled: CompiledSystem, other: CompiledSystem, path: str) -> None:
+    """Raise `ModelError` if the directions of a joint jump between two compiled systems."""
+    own, its = compiled.model, other.model
     for part in ("x", "y", "z", "u"):
         turn = np.abs(getattr(own.rows, part) - getattr(its.rows, part)).max(initial=0.0)
         if turn > SAME_ROW:

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from cms.body.modal_file.file import convert_units, read
 from cms.body.reduced_body import ReducedBody
 from cms.errors import CmsError
-from fe_models.foundation.paths import file_digest
+from fe_models.foundation.paths import file_digest, file_state
 from fe_models.foundation.toml_file import Matrix3, Table, Vector3, existing_file
 from fe_models.foundation.units import Units
 from floatframe.errors import ModelError
@@ -123,8 +123,8 @@ class BodySection(Table):
         return self
 
 
-#: digest and body of each modal file, which a task that reads many systems keeps from one to the next
-ReadBodies = dict[Path, tuple[str, ReducedBody]]
+#: state and body of each modal file, which a task that reads many systems keeps from one to the next
+ReadBodies = dict[Path, tuple[tuple[int, int, int] | None, ReducedBody]]
 
 
 def body_of(
@@ -179,9 +179,9 @@ def reduced_of(name: str, section: BodySection, read_bodies: ReadBodies | None) 
     if section.at is None:
         if read_bodies is None:
             return read(section.file)
-        digest = file_digest(section.file)
-        if section.file not in read_bodies or read_bodies[section.file][0] != digest:
-            read_bodies[section.file] = (digest, read(section.file))
+        state = file_state(section.file)
+        if section.file not in read_bodies or read_bodies[section.file][0] != state:
+            read_bodies[section.file] = (state, read(section.file))
         return read_bodies[section.file][1]
     family = family_of(section.file, file_digest(section.file))
     try:

@@ -187,7 +187,7 @@ def read_system(
         {"length": 0.4, "bodies.rod.mass": 2.0}.
     read_bodies
         Bodies of modal files, empty at first. A caller that reads many systems passes the same dict to each call, so
-        that a modal file is read again only if its content has changed.
+        that a modal file is read again only if it has changed.
 
     Raises
     ------

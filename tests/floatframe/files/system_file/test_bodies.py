@@ -121,3 +121,15 @@ def test_modes_and_parts_are_those_asked_for(write, rod):
 def test_mistakes_are_named(write, change, words):
     with pytest.raises(FloatframeError, match=words):
         read_system(write(change))
+
+
+def test_a_modal_file_is_read_again_only_after_a_change(write, rod):
+    path, bodies = write(), {}
+    first = read_system(path, read_bodies=bodies)[0].body("stiff").reduced
+    ((_, read_once),) = bodies.values()
+    read_system(path, {"bodies.crank.mass": 3.0}, read_bodies=bodies)
+    ((_, kept),) = bodies.values()
+    assert kept is read_once
+    cms.write(with_masses(rod, [AddedMass("end_a", 5.0)]), path.parent / "rod.h5")
+    heavier = read_system(path, read_bodies=bodies)[0].body("stiff").reduced
+    assert_allclose(heavier.moments.m - first.moments.m, 5.0, rtol=1e-12)
