@@ -119,13 +119,15 @@ def euler_parameter_rates(p: Array, omega_B: Array) -> Array:
 
 def series(x: Array, first: int) -> Array:
     """Return Σ (-x)^k / (2 k + first)!."""
-    total, term = np.zeros_like(x), np.ones_like(x)
+    is_number = isinstance(x, float)  # for a single angle, Python numbers are five times as fast as NumPy's
+    x = float(x) if is_number else x
+    total, term = (0.0, 1.0) if is_number else (np.zeros_like(x), np.ones_like(x))
     for k in range(1, first + 1):
         term = term / k
     for k in range(TERMS):
         total = total + term
         term = -term * x / ((2 * k + first + 1) * (2 * k + first + 2))
-    return total
+    return np.float64(total) if is_number else total
 
 
 def series_of_rate(x: Array, first: int) -> Array:

@@ -469,12 +469,14 @@ def driven_angles(model: Model) -> IntArray:
 
 def way_of_drives(model: Model, work: Work, state: State, w: Array, rows: IntArray) -> Array:
     """Return the deviation of prescribed angles from their values, between -pi and pi, (len(rows),) [rad]."""
+    from floatframe.engine.kernels.entry import evaluate_and_linearize
+
     set_iterate(work, state, w=w)
-    linearized(model, work, 1.0, 0.0, 0.0)
+    evaluate_and_linearize(model, work, 1.0, 0.0, 0.0)
     sense = sense_of(model, rows)
     sine = sense * work.connections.g[rows]
     quarter_back = led_by(model, rows, np.full(len(rows), np.pi / 2))
-    linearized(quarter_back, work, 1.0, 0.0, 0.0)
+    evaluate_and_linearize(quarter_back, work, 1.0, 0.0, 0.0)
     return np.arctan2(sine, -sense * work.connections.g[rows])
 
 
@@ -522,11 +524,13 @@ def require_no_half_turns(compiled: CompiledSystem, work: Work, state: State) ->
     state
         State with closed joints, in the frames of the engine.
     """
+    from floatframe.engine.kernels.entry import evaluate_and_linearize
+
     model = compiled.model
     if not (model.rows.kind == DOT).any():
         return
     set_iterate(work, state)
-    linearized(model, work, 1.0, 0.0, 0.0)
+    evaluate_and_linearize(model, work, 1.0, 0.0, 0.0)
     for c, name in enumerate(compiled.connection_names):
         if model.connections.law[c] != JOINT:
             continue

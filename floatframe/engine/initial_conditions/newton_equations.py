@@ -76,33 +76,35 @@ def linearized(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> 
     from floatframe.engine.kernels.entry import evaluate_and_linearize
 
     evaluate_and_linearize(model, work, c_m, c_d, c_k)
-    H = []
-    for i in range(len(model.bodies.kind)):
-        n = 6 + int(model.bodies.n_q[i])
-        H.append(work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape(n, n).copy())
+    bodies, markers, connections = model.bodies, model.markers, model.connections
+    # lists of Python numbers: one read of an array entry takes as long as ten of a list
+    n_of, h0, u0_of = [6 + n for n in bodies.n_q.tolist()], bodies.h0.tolist(), bodies.u0.tolist()
+    sizes, w0_of = connections.size.tolist(), connections.w0.tolist()
+    H = [work.solver.H[h0[i] : h0[i + 1]].reshape(n, n).copy() for i, n in enumerate(n_of)]
     n_w, n_u = len(work.state.w), len(work.state.u)
     J_parts: list[tuple[Array, int, int]] = []
     G_parts: list[tuple[Array, int, int]] = []
-    for m in model.bodies.ends:
-        i, c, o = int(model.markers.body[m]), int(model.markers.connection[m]), int(model.markers.x0[m])
-        n, size = 6 + int(model.bodies.n_q[i]), int(model.connections.size[c])
+    ends = bodies.ends
+    of_end = (markers.body, markers.connection, markers.x0, markers.force, markers.moment, markers.accelerated)
+    for m, i, c, o, force, moment, accelerated in zip(
+        ends.tolist(), *(each[ends].tolist() for each in of_end), strict=True
+    ):
+        n, size = n_of[i], sizes[c]
         R = work.state.R[i]  # rotates each three rows of the following columns
         column = work.solver.J_column[6 * o : 6 * (o + n)].reshape(2, 3, n)
         row = work.solver.J_row[12 * o : 12 * (o + n)].reshape(4, 3, n)
-        w0, u0 = int(model.connections.w0[c]), int(model.bodies.u0[i])
-        carried = model.markers.sign[m] * (R @ column).reshape(6, n)
-        for part, place in ((0, int(model.markers.force[m])), (3, int(model.markers.moment[m]))):
+        w0, u0 = w0_of[c], u0_of[i]
+        carried = markers.sign[m] * (R @ column).reshape(6, n)
+        for part, place in ((0, force), (3, moment)):
             if place >= 0:
                 J_parts.append((carried[part : part + 3], w0 + place, u0))
         G_parts.append((work.connections.P[m, :size] @ (R @ row).reshape(12, n), w0, u0))
-        accelerated = int(model.markers.accelerated[m])
         if accelerated >= 0:
-            o = int(model.markers.a0[m])
+            o = int(markers.a0[m])
             row_a = work.solver.J_a[6 * o : 6 * (o + n)].reshape(2, 3, n)
             G_parts.append((work.connections.P_a[accelerated, :size] @ (R @ row_a).reshape(6, n), w0, u0))
-    connections = model.connections
-    places = zip(connections.size.tolist(), connections.w0.tolist(), strict=False)
-    V = summed([(work.connections.V[c, :size, :size], w0, w0) for c, (size, w0) in enumerate(places)], (n_w, n_w))
+    places = enumerate(zip(sizes, w0_of, strict=False))
+    V = summed([(work.connections.V[c, :size, :size], w0, w0) for c, (size, w0) in places], (n_w, n_w))
     V.eliminate_zeros()
     return Linearized(tuple(H), summed(J_parts, (n_w, n_u)), summed(G_parts, (n_w, n_u)), V)
 
@@ -264,11 +266,11 @@ def with_modal_weight(model: Model, H: tuple[Array, ...], stiff: float = STIFF) 
 
 def with_mass_for_all(model: Model, H: tuple[Array, ...]) -> tuple[Array, ...]:
     """Return mass matrices in which massless modes get a small mass, so that accelerations exist."""
-    omega = MASSLESS * highest_frequency(model)
     complete = []
     for i, block in enumerate(H):
-        M, K = modal_diagonals(model, i, MASS), modal_diagonals(model, i, STIFFNESS)
+        M = modal_diagonals(model, i, MASS)
         if (M <= 0).any():
+            K, omega = modal_diagonals(model, i, STIFFNESS), MASSLESS * highest_frequency(model)
             scale = omega**2 if omega > 0 else max(float(K.max()), 1.0)
             block = block + np.diag(np.concatenate([np.zeros(6), np.where(M <= 0, np.maximum(K, 0) / scale, 0.0)]))
         complete.append(block)

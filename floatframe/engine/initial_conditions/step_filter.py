@@ -49,6 +49,7 @@ from floatframe.engine.initial_conditions.newton_equations import (
 from floatframe.engine.kernels.model import Model
 from floatframe.engine.kernels.work import Work
 from floatframe.model.joints.rows import is_held
+from floatframe.model.rotations import cross
 from floatframe.model.state import State
 
 __all__ = ["Beginning", "Spin", "StepFilter", "beginning_of", "closing_velocities", "spin_of", "step_filter"]
@@ -161,15 +162,17 @@ def spin_of(compiled: CompiledSystem, consistent: ConsistentState, may: NDArray[
 
     model, u, u_dot = compiled.model, consistent.state.u, consistent.u_dot
     bodies, turn, further = np.zeros(len(model.bodies.kind), dtype=np.int64), np.zeros_like(u), np.zeros_like(u)
-    for i, e in enumerate(model.body_types.axis[model.bodies.kind]):
+    axes = model.body_types.axis[model.bodies.kind]
+    for i in np.flatnonzero(axes.any(axis=1)):
+        e = axes[i]
         part = slice(model.bodies.u0[i] + 3, model.bodies.u0[i] + 6)
         omega, alpha = u[part], u_dot[part]
-        by_turn = (e @ omega) * np.cross(omega, e)
+        by_turn = (e @ omega) * cross(omega, e)
         rest = alpha - by_turn
         if (may is None or may[i]) and by_turn.any() and np.linalg.norm(alpha) >= STEADY * np.linalg.norm(rest):
             bodies[i], turn[part] = 1, by_turn
-            rate_of_turn = (e @ alpha) * np.cross(omega, e) + (e @ omega) * np.cross(alpha, e)
-            further[part] = (e @ omega) * np.cross(e, rest) - rate_of_turn
+            rate_of_turn = (e @ alpha) * cross(omega, e) + (e @ omega) * cross(alpha, e)
+            further[part] = (e @ omega) * cross(e, rest) - rate_of_turn
     return Spin(bodies, turn, further)
 
 
@@ -204,17 +207,19 @@ def beginning_of(
 
 def closing_velocities(z: StepFilter, after: State, w: Array, t: float, h: float, rows: NDArray[np.bool_]) -> Array:
     """Return the velocity correction du of (3), (n_u,), for some rows, (n_w,), in a step of size h; z: with s = 1."""
+    from floatframe.engine.kernels.entry import evaluate_and_linearize
+
     model = z.compiled.model
     work, unknowns = work_from(model, w), start_unknowns(model, w)
     if len(model.coordinates.row):  # angles of couplers and user forces are taken nearest to the predicted angles
         row = model.coordinates.row
         work.state.time[...] = t
         set_iterate(work, z.state, w=unknowns)
-        linearized(model, work, 1.0, 0.0, 0.0)
+        evaluate_and_linearize(model, work, 1.0, 0.0, 0.0)
         g = work.connections.g
         unknowns[row] -= g[row]
         unknowns[row] += h * (unknowns[row + 1] - g[row + 1])
     work.state.time[...] = t + h
     set_iterate(work, after, w=unknowns)
-    linearized(model, work, 1.0, 0.0, 0.0)
+    evaluate_and_linearize(model, work, 1.0, 0.0, 0.0)
     return z.closing(np.where(rows, work.connections.g / h, 0.0))

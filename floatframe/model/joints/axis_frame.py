@@ -10,6 +10,7 @@ from fe_models.foundation.arrays import Array
 from floatframe.errors import ModelError
 from floatframe.model.checked_values import unit_vector
 from floatframe.model.functions.time_functions import TimeFunction, constant
+from floatframe.model.rotations import cross
 
 __all__ = [
     "GivenMotions",
@@ -25,9 +26,9 @@ __all__ = [
 def normals_of(axis: Array) -> tuple[Array, Array]:
     """Return two unit vectors normal to the axis, (3,) each, that form a right-handed frame with it."""
     helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    first = np.cross(axis, helper)
+    first = cross(axis, helper)
     first /= np.linalg.norm(first)
-    return first, np.cross(axis, first)
+    return first, cross(axis, first)
 
 
 def axis_in_b(axis: Array, axis_b: Array | None, A_a: Array, A_b: Array) -> Array:
