@@ -145,7 +145,7 @@ def integrate_many(
     if output_every < 1:
         raise ModelError(f"integrate_many: output_every: expected at least 1, got {output_every}")
     n_steps = number_of_steps(start, end, step)
-    t = start + (end - start) / n_steps * np.arange(0, n_steps + 1, output_every)
+    t: Array = np.asarray(start + (end - start) / n_steps * np.arange(0, n_steps + 1, output_every), dtype=float)
     names = tuple(each.name for each in system.sensors) if sensors is None else tuple(sensors)
     if not names:
         raise ModelError(f"integrate_many: sensors: expected at least one, system {system.name!r} has none")

@@ -13,6 +13,8 @@ axis of stacks of any shape. Functions without a branch other than that of the s
 kernels in kernels/rotation.py contain the same formulas for one vector, compiled; a test compares both.
 """
 
+from typing import Any
+
 import numpy as np
 
 from fe_models.foundation.arrays import Array, axial, tilde
@@ -120,14 +122,14 @@ def euler_parameter_rates(p: Array, omega_B: Array) -> Array:
 def series(x: Array, first: int) -> Array:
     """Return Σ (-x)^k / (2 k + first)!."""
     is_number = isinstance(x, float)  # for a single angle, Python numbers are five times as fast as NumPy's
-    x = float(x) if is_number else x
+    value: Any = float(x) if is_number else x
     total, term = (0.0, 1.0) if is_number else (np.zeros_like(x), np.ones_like(x))
     for k in range(1, first + 1):
         term = term / k
     for k in range(TERMS):
         total = total + term
-        term = -term * x / ((2 * k + first + 1) * (2 * k + first + 2))
-    return np.float64(total) if is_number else total
+        term = -term * value / ((2 * k + first + 1) * (2 * k + first + 2))
+    return np.float64(total) if is_number else total  # type: ignore[return-value]  # numbers are arrays of shape ()
 
 
 def series_of_rate(x: Array, first: int) -> Array:

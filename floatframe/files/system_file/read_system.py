@@ -202,8 +202,9 @@ def read_system(
     try:
         units = unit_system(data.system.units)
         bodies = [body_of(name, section, files, units, read_bodies) for name, section in data.bodies.items()]
-        for file in set(read_bodies or ()) - {section.file for section in data.bodies.values()}:
-            del read_bodies[file]  # type: ignore[index]
+        if read_bodies is not None:
+            for file in set(read_bodies) - {section.file for section in data.bodies.values()}:
+                del read_bodies[file]
         signals = signal_functions(data.signals, units)
         joints = [joint_of(name, section, signals) for name, section in data.joints.items()]
         couplers = [coupler_of(name, section, signals) for name, section in data.couplers.items()]
