@@ -194,7 +194,6 @@ def modes_command(
 @guarded
 def formats_command(
     json: Annotated[bool, typer.Option("--json", help="Write the table as JSON, for other programs.")] = False,
-    markdown: Annotated[bool, typer.Option("--markdown", help="Write the table of docs/formats.md.")] = False,
 ) -> None:
     """Formats of other programs, and what each cannot hold.
 
@@ -204,7 +203,7 @@ def formats_command(
     """
     from cms.cli.exchange import list_formats
 
-    list_formats(as_json=json, as_markdown=markdown)
+    list_formats(as_json=json)
 
 
 @guarded

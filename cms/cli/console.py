@@ -14,6 +14,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 import typer
@@ -35,6 +36,7 @@ __all__ = [
     "register",
     "run",
     "say",
+    "say_written",
     "stages",
     "vector_words",
     "version_option",
@@ -271,8 +273,6 @@ def output_path(
     error
         If the folder does not exist, the path is a folder, or the path is one of the inputs.
     """
-    from pathlib import Path
-
     from fe_models.foundation.paths import is_stream, same_file
 
     path = Path(default if given is None else given)
@@ -321,6 +321,12 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[Any]
 def say(text: str) -> None:
     """Print a line on standard output, literally."""
     out().print(text, markup=False, soft_wrap=True)
+
+
+def say_written(path: Path, n_bytes: int | None = None) -> None:
+    """Print the name and size of a written file; without `n_bytes` the size of the file on disk."""
+    size = path.stat().st_size if n_bytes is None else n_bytes
+    say(f"wrote {path} ({size / 1e6:.2f} MB)" if size >= 1e5 else f"wrote {path} ({size / 1e3:.1f} kB)")
 
 
 def escape(cell: Any) -> str:

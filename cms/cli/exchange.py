@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import typer
 
-from cms.cli.console import output_path, print_table, say, stages
+from cms.cli.console import output_path, print_table, say, say_written, stages
 from cms.errors import ExportError, ForeignBodyError, JobError, ModalFileError, RecoveryError
 from cms.exchange.export import WRITERS, export_body, unknown_format
 from cms.exchange.import_body import BODY_FORMATS, REDUCED_MATRICES
@@ -52,19 +52,17 @@ IN = ("program", "format", "holds", "what is lost", "tried")
 OUT = ("program", "format", "--to", "what is lost", "tried")
 
 
-def list_formats(*, as_json: bool, as_markdown: bool) -> None:
-    """Print the formats that are read and those that are written, as tables, as JSON, or for docs/formats.md."""
+def list_formats(*, as_json: bool) -> None:
+    """Print the formats that are read and those that are written, as tables or as JSON."""
     if as_json:
         typer.echo(json.dumps([known.record() for known in (*FORMATS, *formats_of_packages())], indent=2))
-    elif as_markdown:
-        typer.echo(markdown_tables())
     else:
         print_table("What comes in", IN, rows_in(*formats_of_packages()))
         print_table("What goes out", OUT, rows_out())
 
 
 def markdown_tables() -> str:
-    """Return both tables in the form of docs/formats.md."""
+    """Return both tables in Markdown, for the page of all formats."""
     parts = (("What comes in", IN, rows_in()), ("What goes out", OUT, rows_out()))
     return "\n\n".join(f"**{title}**\n\n{markdown(head, rows)}" for title, head, rows in parts)
 
@@ -130,7 +128,10 @@ def run_export(request: ExportRequest) -> None:
     )
     units = exported.units
     for written in exported.files:
-        say(f"wrote {written} ({written.stat().st_size / 1e6:.2f} MB)" if written.is_file() else f"wrote {written}")
+        if written.is_file():
+            say_written(written)
+        else:
+            say(f"wrote {written}")
     say(f"units: {units.name} ({units.length_symbol}, {units.mass_symbol}, {units.time_symbol})")
     for note in exported.notes:
         say(note)
@@ -218,7 +219,7 @@ def run_import(request: ImportRequest) -> "ReducedBody":
             )
         with clock("write"):
             write(body, path)
-    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    say_written(path)
     return body
 
 

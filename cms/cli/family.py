@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from cms.cli.arguments import Output, SetValues, Solver, changes_of
-from cms.cli.console import guarded, output_path, print_table, say, stages
+from cms.cli.console import guarded, output_path, print_table, say, say_written, stages
 from cms.cli.info import print_body
 from cms.errors import JobError, ModalFileError
 from fe_models.foundation.words import quoted
@@ -58,7 +58,7 @@ def family_command(
     if family.errors is not None:
         print_table("Estimated errors of interpolated bodies", ("", "error>"), family.errors.rows())
         say(f"Found with {family.errors.method}.")
-    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    say_written(path)
 
 
 def values_of(given: list[str]) -> dict[str, tuple[float, ...]]:
@@ -106,4 +106,4 @@ def interpolate_command(
     body = read_parametric_body(file).at(**point)
     write(body, path)
     print_body(body)
-    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    say_written(path)

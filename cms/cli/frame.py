@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cms.cli.console import output_path, say, stages
+from cms.cli.console import output_path, say_written, stages
 from cms.errors import JobError, ModalFileError
 from fe_models.foundation.words import nearest
 
@@ -59,7 +59,7 @@ def run_frame(request: FrameRequest) -> "ReducedBody":
             converted = convert_frame(body, frame, damping=damping_of(request))
         with clock("write"):
             write(converted, path)
-    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    say_written(path)
     return converted
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cms.cli.arguments import ModalFile
-from cms.cli.console import guarded, output_path, print_table, say, stages, vector_words
+from cms.cli.console import guarded, output_path, print_table, say, say_written, stages, vector_words
 
 if TYPE_CHECKING:
     from cms.body.reduced_body import ReducedBody
@@ -59,7 +59,7 @@ def view_command(
             with clock("film") as advance:
                 animate_mode(body, mode, animate, scale=scale, on_frame=lambda done, all_: advance(done / all_))
     for path in targets:
-        say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+        say_written(path)
 
 
 # modes ----------------------------------------------------------------------------------------------------------------

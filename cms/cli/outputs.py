@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cms.cli.console import output_path, say
+from cms.cli.console import output_path, say_written
 from fe_models.foundation.documents import TABLE_SUFFIXES
 from fe_models.foundation.extras import extra_module
 
@@ -124,7 +124,7 @@ def write_outputs(
     replace_files(contents)
     if not is_quiet:
         for path, content in contents.items():
-            say(f"wrote {path} ({len(content) / 1e6:.2f} MB)")
+            say_written(path, len(content))
 
 
 def picture_files(path: Path, pages: "Sequence[Figure]", dpi: int) -> dict[Path, bytes]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cms.cli.arguments import Memory, SetValues, Solver, Workers, changes_of
-from cms.cli.console import USER_ERROR, guarded, output_path, print_error, print_table, say, stages
+from cms.cli.console import USER_ERROR, guarded, output_path, print_error, print_table, say, say_written, stages
 from cms.cli.info import print_body
 from cms.errors import JobError
 from fe_models.foundation.errors import ReportedError
@@ -46,7 +46,7 @@ def reduce_and_write(job: "Job", path: Path, solver: str | None = None, memory: 
             print_table(report.title, ("", ""), report.rows(omit=omit))
     print_body(reduced, has_warned=True)
     print_times(clock)
-    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    say_written(path)
     return reduced
 
 

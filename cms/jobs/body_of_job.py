@@ -2,12 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cms.errors import JobError
-from cms.jobs.job import Job
+from cms.jobs.job import Job, read_job
 from fe_models.assembly.assemble import assemble
 from fe_models.assembly.model import FEModel, ModelTables
 from fe_models.assembly.tables.attachments import one_node
@@ -16,13 +17,13 @@ from fe_models.assembly.tables.materials import SolidSection
 from fe_models.assembly.tables.places import InterfaceSection, interfaces_of, load_cases_of
 from fe_models.body.couplings.coupling_on_ranks import spread_body
 from fe_models.body.fe_body import FEBody
+from fe_models.files.decks.deck import Deck
 from fe_models.foundation.ranks.ranks import Ranks
 from fe_models.foundation.stages import Stages
 from fe_models.foundation.units import UNIT_SYSTEMS
 from fe_models.meshes.mesh import Mesh, drop_unused_nodes
 
 if TYPE_CHECKING:
-    from fe_models.files.decks.deck import Deck
     from fe_models.files.matrices.model import GivenArrays, GivenMatrices
     from fe_models.meshes.line_mesh import LineMesh
     from fe_models.meshes.selections import AnyMesh
@@ -192,17 +193,19 @@ def tied_body(
 
 
 def job_body(
-    job: Job,
+    job: Job | Path | str,
     stages: Stages | None = None,
     *,
     on_report: Callable[[Any], None] | None = None,
-    source: "Mesh | Deck | None" = None,
+    source: Mesh | Deck | None = None,
     ranks: Ranks | None = None,
 ) -> FEBody:
     """Process a job up to the coupled body: read, check, assemble, and couple the interfaces.
 
     Parameters
     ----------
+    job
+        A job file, or a job that has been read.
     source
         Solid mesh of the job without unused nodes, if it is known, which is not read or checked again; or its deck.
     ranks
@@ -210,6 +213,7 @@ def job_body(
         are assembled in this process, and then distributed over the ranks.
     """
     stages = stages or Stages()
+    job = job if isinstance(job, Job) else read_job(job)
     body = uncoupled_body(job, stages, on_report=on_report, source=source, ranks=ranks)
     with stages("couple interfaces"):
         body = coupled_body(job, body)

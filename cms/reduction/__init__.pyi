@@ -1,5 +1,6 @@
 from cms.family import reduce_family as reduce_family
 from cms.fleet import reduce_fleet as reduce_fleet
+from cms.jobs.body_of_job import job_body as job_body
 
 from .assumed_mode_beams.assumed_beam import beam_from_assumed_modes as beam_from_assumed_modes
 from .basis.damping import ModalDamping as ModalDamping

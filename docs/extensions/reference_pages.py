@@ -11,6 +11,7 @@ from copied_pages import put
 from sphinx.application import Sphinx
 
 import cms.cli.app
+import cms.cli.exchange
 import floatframe.cli.app
 from fe_models.files.field_pages import field_tables
 from fe_models.foundation.file_kinds import KINDS
@@ -25,7 +26,7 @@ def write_pages(app: Sphinx) -> None:
     folder.mkdir(exist_ok=True)
     pages = {f"{name}-commands.md": commands_page(name) for name in PROGRAMS}
     pages |= {f"{kind}-file.md": keys_page(kind) for kind in KINDS}
-    pages["deck-fields.md"] = fields_page()
+    pages |= {"deck-fields.md": fields_page(), "formats.md": formats_page()}
     for old in folder.glob("*.md"):
         if old.name not in pages:
             old.unlink()
@@ -119,6 +120,20 @@ def fields_page() -> str:
         "",
     ]
     return "\n".join(lines)
+
+
+# formats -------------------------------------------------------------------------------------------------------
+
+
+def formats_page() -> str:
+    """Return the page of all formats, one table for what comes in and one for what goes out."""
+    lines = [
+        "# All formats",
+        "",
+        "`cms formats` prints the same tables; [formats](../formats.md) says how they are used.",
+        "",
+    ]
+    return "\n".join([*lines, cms.cli.exchange.markdown_tables(), ""])
 
 
 # text ------------------------------------------------------------------------------------------------------------

@@ -1,5 +1,6 @@
 from fe_models.foundation.documents.table import Table as Table
 from fe_models.foundation.documents.table import read_table as read_table
+from fe_models.foundation.documents.write import write_document as write_document
 
 from .cad.cad_faces import CadFace as CadFace
 from .cad.cad_mesh import MeshSize as MeshSize

@@ -23,10 +23,14 @@ STANDARD = {"/dev/stdout": 1, "/dev/stderr": 2}
 
 
 def near_file(path: Path) -> str:
-    """Return the end of a message about a missing file: the most similar name in its folder."""
+    """Return the end of a message about a missing file: the most similar name in its folder.
+
+    A file that is described in TOML, such as the job that names a mesh, does not replace a file of another kind.
+    """
     if not path.parent.is_dir():
         return f"; the folder {path.parent} does not exist"
-    hint = nearest(path.name, [p.name for p in path.parent.iterdir()])
+    there = [p.name for p in path.parent.iterdir() if p.suffix != ".toml" or path.suffix == ".toml"]
+    hint = nearest(path.name, there)
     return hint.split("? ")[0] + "?" if "did you mean" in hint else ""
 
 

@@ -119,7 +119,8 @@ def mobility_record(system: System) -> QualityRecord:
     except FloatframeError as error:
         return record("mobility", "Mobility", "fail", str(error))
     words = (
-        f"{found.n_freedoms} independent motions: {found.n_bodies} bodies with {found.n_modes} modes minus "
+        f"{found.n_freedoms} independent motions: {found.n_bodies} {'body' if found.n_bodies == 1 else 'bodies'} with "
+        f"{found.n_modes} modes minus "
         f"{found.n_constraints} constraints; {found.mobility} if all bodies were rigid (Gruebler's "
         f"count: {found.gruebler})"
     )
@@ -268,7 +269,8 @@ def step_record(system: System, found: SystemVibrations, h: float, *, has_fixed_
     steps = 1 / (h * f)
     followed, unseen = int((steps >= FOLLOWED * (1 - 1e-9)).sum()), int((steps < SEEN).sum())
     words = (
-        f"h = {h:g} {second} resolves {followed} of {len(f)} vibrations ({FOLLOWED:g} steps per period)"
+        f"h = {h:g} {second} resolves {followed} of {len(f)} vibrations (at least {FOLLOWED:g} steps per period; "
+        f"the slowest has {steps[0]:.3g})"
         f"{f'; {unseen} have less than {SEEN:g} steps per period' if unseen else ''}; the slowest needs "
         f"h = {1 / (FOLLOWED * f[0]):.2g} {second}, the fastest {1 / (FOLLOWED * f[-1]):.2g} {second}"
     )

@@ -16,7 +16,7 @@ of motion become
     M eta + C nu + K xi - Jᵀ dw = F s            bodies
     G_x xi + G_v nu + V dw + E s + E' s' = 0     rows: V = 0 and G_v = 0 for joint constraints
 
-(derivation: docs/small_motions.md). Rows with V are laws of a wrench, such as a moment
+(docs/theory.md §10). Rows with V are laws of a wrench, such as a moment
 about a free axis or the tension of a spring; they are solved for the wrench. Let Z be a basis of the wrenches that the
 laws leave undetermined, V_f Z = 0, and r the left side of the equations of the bodies without Jᵀ Z lam. Then
 

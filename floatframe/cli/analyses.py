@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cms.cli.arguments import SetValues, changes_of
-from cms.cli.console import guarded, output_path, print_table, say, stages, vector_words
+from cms.cli.console import guarded, output_path, print_table, say, say_written, stages, vector_words
 from cms.cli.outputs import PICTURES, TABLES, output_file, write_outputs
 
 if TYPE_CHECKING:
@@ -284,7 +284,7 @@ def draw_mode_film(
             draw_mode(model, about, modes, k, path, color=color)
         else:
             animate_mode(model, about, modes, k, path, color=color, on_frame=lambda done, all_: advance(done / all_))
-    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    say_written(path)
 
 
 def read_in_formulation(path: Path, formulation: str | None, set_values: Sequence[str] = ()) -> "tuple[System, str]":

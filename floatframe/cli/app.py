@@ -26,7 +26,7 @@ from cms.cli.console import (
     print_error,
     print_table,
     register,
-    say,
+    say_written,
     stages,
 )
 from cms.cli.demo import demo_command
@@ -187,7 +187,7 @@ def compute(name: str, path: Path, run: "Callable[[Callable[[Progress], None]], 
         print_error(f"interrupted; {kept if segments.is_dir() else 'nothing was written'}")
         raise typer.Exit(INTERRUPTED) from None
     print_run(trajectory)
-    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    say_written(path)
 
 
 def load_kernels(clock: "Stages") -> None:
@@ -470,7 +470,7 @@ def animate_command(
             trajectory, bodies, path, fps=fps, speed=speed, magnification=magnification, color=BODY_COLORS[color],
             system=system, on_frame=lambda done, all_: advance(done / all_),
         )  # fmt: skip
-    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    say_written(path)
 
 
 register(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cms.cli.arguments import SetValues, changes_of
-from cms.cli.console import guarded, output_path, print_table, say, stages
+from cms.cli.console import guarded, output_path, print_table, say, say_written, stages
 
 if TYPE_CHECKING:
     from floatframe.model.system import System
@@ -46,7 +46,7 @@ def kinematics_command(
         return
     print_coordinates(record)
     say(f"{record['n_times']} times from {record['t_first']:g} to {record['t_last']:g} {model.units.time_symbol}")
-    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    say_written(path)
 
 
 @guarded
@@ -100,7 +100,7 @@ def inverse_command(
         [(name, f"{r['largest_force']:.6g}", f"{r['largest_moment']:.6g}") for name, r in record["reactions"].items()],
     )
     say(f"{record['n_times']} times from {record['t_first']:g} to {record['t_last']:g} {units.time_symbol}")
-    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    say_written(path)
 
 
 def driven_motion(

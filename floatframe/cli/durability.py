@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cms.cli.console import guarded, output_path, print_table, say, stages
+from cms.cli.console import guarded, output_path, print_table, say, say_written, stages
 from cms.cli.outputs import DOCUMENTS, TABLES, json_text, output_files, write_outputs
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def fatigue_command(
         if drawing.note:
             typer.echo(f"note: {drawing.note}", err=True)
         if not json:
-            say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+            say_written(path)
     write_outputs(
         paths, table=lambda: worst_table(made), record=record, document=lambda: fatigue_document(made), is_quiet=json,
         others={".vtu": lambda _: vtu_of(made)},

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from cms.cli.console import guarded, output_path, print_table, say, stages
+from cms.cli.console import guarded, output_path, print_table, say, say_written, stages
 from cms.cli.outputs import TABLES, output_file, write_outputs
 
 __all__ = ["TARGETS", "export_command"]
@@ -233,7 +233,7 @@ def write_signals(file: Path, output: Path | None, *, sensors: Sequence[str] = (
         output, file.with_suffix(SIGNALS[0]), SIGNALS, ResultsError, overwrite_of=(file, *trajectory.files)
     )
     write_rpc(sensor_signals(trajectory, [*sensors]), path)
-    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    say_written(path)
 
 
 def write_surfaces(file: Path, output: Path | None, *, every: int = 1) -> None:
@@ -300,7 +300,7 @@ def write_unit(
             )  # fmt: skip
     print_variables(written.variables)
     say(f"FMI {fmi}.0 for {', '.join(written.platforms)}; it needs Python with floatframe where it runs")
-    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    say_written(path)
 
 
 def write_compiled_unit(
@@ -317,7 +317,7 @@ def write_compiled_unit(
     made = generate_fmu(described, path, fmi=fmi, step=step, parameters=parameters, stop_time=stop)
     print_variables([each for each in made.variables if each.causality in ("input", "output", "parameter")])
     say(f"FMI {fmi}.0 for {made.platform}, model exchange and co-simulation; its sources are in it")
-    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    say_written(path)
 
 
 def print_variables(variables: Sequence[Any]) -> None:

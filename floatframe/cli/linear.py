@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cms.cli.arguments import SetValues
-from cms.cli.console import guarded, print_table, say
+from cms.cli.console import guarded, print_table, say, say_written
 from cms.cli.outputs import PICTURES, TABLES, output_file, write_outputs
 from floatframe.cli.analyses import Axis, Center, Formulation, Speed, SystemArgument, linearized, read_in_formulation
 
@@ -78,7 +78,7 @@ def linearize_command(
     if not linear.inputs or not linear.outputs:
         say("name inputs and outputs in tables [inputs.NAME] and [outputs.NAME], or with --input and --out")
     say(f"states: {', '.join(space.states[: len(space.states) // 2])}, and their rates")
-    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    say_written(path)
 
 
 @guarded

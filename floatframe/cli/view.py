@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from cms.cli.console import guarded, say, stages
+from cms.cli.console import guarded, say, say_written, stages
 from cms.cli.outputs import output_file
 from floatframe.cli.analyses import Axis, Center, Speed, linearized, read_in_formulation
 
@@ -82,7 +82,7 @@ def view_command(
             page = view(trajectory, path, sensors=sensors, color=color, magnification=magnification, largest=largest)
     for note in page.notes:
         say(note)
-    say(f"wrote {page.path} ({page.size / 1e6:.2f} MB)")
+    say_written(page.path, page.size)
 
 
 def page_path(output: Path | None, file: Path, inputs: tuple[Path | str, ...]) -> Path:

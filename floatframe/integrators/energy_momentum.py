@@ -30,7 +30,7 @@ class EnergyMomentum(DiscreteScheme):
     F, tau, Q act at the mean lever with the discrete derivatives of kernels/markers.py, so that they do the work of
     the true displacements. T' - T is mean(v)·(2) + mean(omega)·(3) + mean(q_dot)·(4), because M is of degree two in q:
     energy changes by the work of forces alone, and closed joints do no work. Torques of internal forces cancel, because
-    their levers end at the mean of the true positions. docs/conserving.md has the derivation.
+    their levers end at the mean of the true positions (docs/theory.md §9).
 
     The mean velocities of a step fulfil the joints exactly, the velocities at its ends to second order. Accelerations
     and reactions in the results follow from the equations of motion at the output times, for velocities that fulfil

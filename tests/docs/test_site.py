@@ -67,7 +67,8 @@ def test_reference_pages_hold_every_command_option_and_key(tmp_path):
     (tmp_path / "reference" / "gone-file.md").write_text("old")
     reference_pages.write_pages(SimpleNamespace(srcdir=tmp_path))
     pages = {path.stem: path.read_text(encoding="utf-8") for path in (tmp_path / "reference").glob("*.md")}
-    assert set(pages) == {"cms-commands", "floatframe-commands", "deck-fields", *(f"{kind}-file" for kind in KINDS)}
+    made = {"cms-commands", "floatframe-commands", "deck-fields", "formats"}
+    assert set(pages) == made | {f"{kind}-file" for kind in KINDS}
     reduce = pages["cms-commands"].split("### cms reduce\n")[1].split("###")[0]
     assert re.search(
         r"^\| `--workers`, `-j` \| Where tasks are computed: .* \[cluster\]\(\.\./cluster\.md\)", reduce, re.MULTILINE

@@ -15,20 +15,6 @@ NAMES = sorted(path.stem for path in NOTEBOOKS.glob("*.ipynb"))
 PACKAGES = ("fe_models", "cms", "floatframe")
 #: rooms from which pages of the documentation import
 ROOMS = ("floatframe.machines.", "floatframe.files.signals.")
-#: other names that notebooks import and that no namespace offers
-NOT_PUBLIC = {
-    "controlled_arm": {"floatframe.model.bodies.mode_choice.with_modes"},
-    "deployable_antenna": {"floatframe.engine.compiling.system.compiled_system"},
-    "from_your_fe_program_to_a_motion": {"cms.jobs.body_of_job.job_body", "cms.jobs.job.read_job"},
-    "railway_engine": {"floatframe.design.laboratory.body_figures.error_figure"},
-    "spacecraft_tower": {
-        "cms.jobs.body_of_job.job_body", "cms.jobs.job.read_job", "floatframe.model.bodies.mode_choice.with_modes",
-        "fe_models.foundation.documents.write.write_document", "floatframe.durability.shaking.page.shake_document",
-    },
-    "suspension_arm": {
-        "cms.jobs.body_of_job.job_body", "cms.jobs.job.read_job", "floatframe.model.rotations.rotation_matrix",
-    },
-}  # fmt: skip
 CELL = "for k in range(3):\n    square = k * k\n    print(square)"
 
 
@@ -59,8 +45,7 @@ def test_a_notebook_imports_public_names_and_those_of_documented_rooms(name):
         if isinstance(statement, ast.ImportFrom) and statement.module.split(".")[0] in PACKAGES
         for each in statement.names
     }
-    below = {each for each in imported - public if not each.startswith(ROOMS)}
-    assert below == NOT_PUBLIC.get(name, set())
+    assert {each for each in imported - public if not each.startswith(ROOMS)} == set()
 
 
 @pytest.mark.parametrize("name", NAMES)

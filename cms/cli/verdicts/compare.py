@@ -6,7 +6,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cms.cli.console import print_table, say, stages
+from cms.cli.console import print_table, say, say_written, stages
 from cms.errors import CompareError
 from fe_models.foundation.formats import by_suffix
 from fe_models.foundation.words import nearest, quoted
@@ -88,7 +88,7 @@ def run_compare(request: CompareRequest) -> None:
             print_table(report.title, ("", ""), report.rows())
     print_comparison(comparison)
     for path in written:
-        say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+        say_written(path)
 
 
 def require_job(path: Path) -> None:

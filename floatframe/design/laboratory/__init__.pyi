@@ -1,3 +1,4 @@
+from .body_figures import error_figure as error_figure
 from .cases import Case as Case
 from .cases import grid as grid
 from .exact_beam import ExactBeam as ExactBeam

@@ -11,6 +11,7 @@ from .loads.shock import TimeTest as TimeTest
 from .loads.sine import SineTest as SineTest
 from .loads.slopes import level_of_bands as level_of_bands
 from .loads.uncertainty import Uncertainty as Uncertainty
+from .page import shake_document as shake_document
 from .responses.response_spectrum import shock_response_spectrum as shock_response_spectrum
 from .shake import NotchRequest as NotchRequest
 from .shake import ShakeJob as ShakeJob

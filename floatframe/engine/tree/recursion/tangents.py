@@ -1,4 +1,4 @@
-"""Exact derivatives of inverse dynamics by positions and rates, by recursion (docs/recursive.md §5).
+"""Exact derivatives of inverse dynamics by positions and rates, by recursion (docs/theory.md §10).
 
 All vectors are in ground axes about the origin of the ground. A rate j moves its subtree by S_j. In axes that move with
 the subtree, the velocities of all its bodies change by one motion Y_j, and their spatial accelerations A by
