@@ -15,7 +15,6 @@ from tests.root import ROOT
 __all__ = ["PAGE", "REFUSED", "table"]
 
 PAGE = ROOT / "docs/integrators.md"
-EVERYTHING = "all other bodies, joints, forces and elements"
 BEGIN, END = "<!-- every part -->\n\n", "\n\n<!-- end of every part -->"
 
 
@@ -67,21 +66,20 @@ REFUSED: dict[str, dict[str, Refusal]] = {
 
 
 def table() -> str:
-    """Return the table: parts that fare alike in one row, what all take last, and below it why parts are refused."""
+    """Return the table of what is refused: parts that fare alike in one row, with the schemes and their reasons."""
     rows: dict[tuple[Refusal | None, ...], list[str]] = {}
     for part in (*PARTS, *ELEMENT_PARTS):
         rows.setdefault(tuple(REFUSED.get(name, {}).get(part) for name in METHODS), []).append(part)
-    letters: dict[Refusal, str] = {}
-    for fares in rows:
-        for each in fares:
+    lines = ["| part | refused by |", "|---|---|"]
+    for fares, parts in rows.items():
+        schemes: dict[Refusal, list[str]] = {}
+        for name, each in zip(METHODS, fares, strict=True):
             if each is not None:
-                letters.setdefault(each, "abcdefghij"[len(letters)])
-    lines = ["| part | " + " | ".join(METHODS) + " |", "|---" * (len(METHODS) + 1) + "|"]
-    for fares, parts in sorted(rows.items(), key=lambda row: not any(row[0])):
-        cells = ["yes" if each is None else f"no ({letters[each]})" for each in fares]
-        lines.append(f"| {listed(parts) if any(fares) else EVERYTHING} | {' | '.join(cells)} |")
-    reasons = "; ".join(f"{letter}: {each.reason}" for each, letter in letters.items())
-    return "\n".join([*lines, "", f"Reasons of refusal: {reasons}."])
+                schemes.setdefault(each, []).append(name)
+        if schemes:
+            refused = "; ".join(f"{', '.join(names)}: {each.reason}" for each, names in schemes.items())
+            lines.append(f"| {listed(parts)} | {refused} |")
+    return "\n".join(lines)
 
 
 def listed(parts: Iterable[str]) -> str:
