@@ -149,7 +149,9 @@ def faces_command(
 @guarded
 def converge_command(
     job: Annotated[Path, typer.Argument(help="Job file (TOML) of a solid or a shell.")],
-    ratio: Annotated[float, typer.Option(help="Ratio of the coarser mesh size to that of the job.")] = 1.5,
+    ratio: Annotated[
+        float | None, typer.Option(help="Ratio of the coarser mesh size to that of a CAD job; default: 1.5.")
+    ] = None,
     modes: Annotated[int, typer.Option(help="Number of elastic free modes to compare.")] = 10,
     error: Annotated[
         float, typer.Option(help="Wanted error of the frequencies, for which an element size is proposed.")

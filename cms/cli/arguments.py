@@ -64,13 +64,15 @@ def changes_of(given: Sequence[str]) -> dict[str, Any]:
     Raises
     ------
     CmsError
-        If an option has no name, or no "=".
+        If an option has no name, or no "=", or a name occurs twice.
     """
     changes: dict[str, Any] = {}
     for each in given:
         name, equals, value = each.partition("=")
         if not name.strip() or not equals:
             raise CmsError(f"--set {each}: expected NAME=VALUE, such as length=0.4")
+        if name.strip() in changes:
+            raise CmsError(f"--set {each}: {name.strip()!r} already has a value; give each name once")
         try:
             changes[name.strip()] = tomllib.loads(f"value = {value}")["value"]
         except tomllib.TOMLDecodeError:

@@ -34,7 +34,7 @@ class ConvergeRequest:
     """Arguments of `cms converge`."""
 
     path: Path
-    ratio: float
+    ratio: float | None
     n_modes: int
     error: float
     output: Path | None
@@ -50,7 +50,7 @@ def run_converge(request: ConvergeRequest, changes: Mapping[str, Any]) -> None:
         If the job is invalid, or nothing is known about the errors.
     """
     from cms.jobs.job import read_job
-    from cms.jobs.studies.mesh_convergence import mesh_convergence
+    from cms.jobs.studies.mesh_convergence import RATIO, mesh_convergence
     from cms.jobs.studies.mesh_estimate import draw_oversize
 
     if not 0 < request.error < np.inf:
@@ -61,9 +61,15 @@ def run_converge(request: ConvergeRequest, changes: Mapping[str, Any]) -> None:
     with stages() as clock:
         result = None
         if job.mesh_size is None:
+            if request.ratio is not None:
+                raise JobError(
+                    f"converge: --ratio {request.ratio:g}: {request.path} has one mesh; expected a CAD file with "
+                    "[mesh_size], which can be meshed again; leave --ratio out"
+                )
             estimate = estimate_of_job(job, request.n_modes, clock)
         else:
-            result = mesh_convergence(job, ratio=request.ratio, n_modes=request.n_modes, stages=clock)
+            ratio = RATIO if request.ratio is None else request.ratio
+            result = mesh_convergence(job, ratio=ratio, n_modes=request.n_modes, stages=clock)
             estimate = result.estimates[1]
         if request.output is not None:
             with clock("draw"):

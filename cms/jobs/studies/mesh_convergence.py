@@ -30,6 +30,7 @@ __all__ = ["ORDER", "MeshConvergence", "mesh_convergence"]
 
 ORDER = 1.0  #: assumed order of convergence of the frequencies
 RATES = 1.0, 4.0  #: least and largest power of step (5)
+RATIO = 1.5  #: default ratio of the sizes in the two meshes
 LEAST_RATIO = 1.05  #: smallest ratio of the sizes in the two meshes
 
 
@@ -70,7 +71,7 @@ class MeshConvergence:
 
 
 def mesh_convergence(
-    job: Job | Path | str, *, ratio: float = 1.5, n_modes: int = 10, stages: Stages | None = None
+    job: Job | Path | str, *, ratio: float = RATIO, n_modes: int = 10, stages: Stages | None = None
 ) -> MeshConvergence:
     """Compute the free frequencies of a CAD job at its own mesh size and at a coarser one.
 

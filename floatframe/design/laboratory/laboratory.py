@@ -190,6 +190,7 @@ def study(
     reference: Case | FullModel | ExactBeam | Reference,
     sensors: Sequence[str] | None = None,
     cut: str = "rigid",
+    watch: str = "stop",
     stages: Stages | None = None,
     on_case: Callable[[CaseResult], None] | None = None,
 ) -> LaboratoryResult:
@@ -219,6 +220,8 @@ def study(
     cut
         Interfaces at the cuts of parts, "rigid" or "distributing"; rigid ones keep sections plane and undistorted, so
         that parts of a solid are somewhat stiffer than the whole.
+    watch
+        What a run does if its steps distort the motion (`floatframe.integrate`).
     stages
         Shows the progress of each case and records its duration; None: a new one is made.
     on_case
@@ -248,9 +251,9 @@ def study(
 
         def moved(changed: System) -> Run:
             if not found:
-                integrate(changed, integrator, h, h)  # compiles
+                integrate(changed, integrator, h, h, watch=watch)  # compiles
             begun = time.process_time()
-            motion = integrate(changed, integrator, t_end, h)
+            motion = integrate(changed, integrator, t_end, h, watch=watch)
             seconds = time.process_time() - begun
             chosen = [sensor for sensor in changed.sensors if sensor.name in wanted]
             columns = {f"{name} {key}": values for name, each in measured(changed, motion, chosen).items()  # type: ignore[arg-type]

@@ -145,6 +145,7 @@ def run_laboratory(
         reference=reference,
         sensors=asked.sensors,
         cut=asked.cut,
+        watch=run.watch,
         stages=stages,
         on_case=on_case,
     )

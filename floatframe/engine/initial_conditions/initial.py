@@ -10,6 +10,7 @@ joints/rows/kinds.py; the unknown reactions w include the rows GAUGE and SPRING)
 W is the mass plus the scaled stiffness, so that (1) and (2) move the bodies instead of deforming them.
 """
 
+import logging
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -67,6 +68,8 @@ __all__ = [
     "work_from",
 ]
 
+
+log = logging.getLogger(__name__)
 
 ASSEMBLED = 1e-12  #: largest residual |g| of a closed joint; for points relative to the size of the system
 MOST_ITERATIONS = 30
@@ -378,6 +381,13 @@ def solve_accelerations(
         is_linear = not has_normal_friction(model) and not len(model.states.row) and not feels_accelerations
         if is_linear or np.abs(change).max(initial=0.0) <= 1e-10 * np.abs(w).max(initial=0.0):
             break
+    else:
+        log.warning(
+            "the accelerations at the start were not found in %d iterations: friction or a user's force changes the "
+            "reactions on which it depends by more than these, so rigid bodies may have no motion, or several; take a "
+            "smaller coefficient of friction, or a bushing in place of the joint",
+            MOST_ITERATIONS,
+        )
     return in_ground_axes(model, state, y), w
 
 

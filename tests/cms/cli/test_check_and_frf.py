@@ -95,6 +95,8 @@ def test_the_file_of_another_job_fails(folder):
         (["compare", "bar.toml", "--set", "n=1"], ["there is no parameter 'n'"]),
         (["modes", "bar.toml", "--set", "n=1"], ["there is no parameter 'n'"]),
         (["converge", "bar.toml", "--set", "n=1"], ["there is no parameter 'n'"]),
+        (["converge", "bar.toml", "--ratio", "2"], ["--ratio 2", "bar.toml has one mesh", "leave --ratio out"]),
+        (["modes", "bar.toml", "--set", "n=1", "--set", "n = 2"], ["--set n = 2", "'n' already has a value"]),
         (["converge", "bar.toml", "--error", "inf"], ["--error inf: expected a number above 0"]),
         (["converge", "bar.toml", "--error", "nan"], ["--error nan: expected a number above 0"]),
         (["frf", "bar.h5", *FRF, "--set", "n=1"], ["--set", "--job"]),

@@ -1,5 +1,7 @@
 """Consistent initial conditions, and what is refused."""
 
+import logging
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -10,6 +12,7 @@ from floatframe import (
     FlexibleBody,
     GeneralizedAlpha,
     Gravity,
+    JointForce,
     Marker,
     RevoluteJoint,
     RigidBody,
@@ -237,3 +240,22 @@ def test_a_door_on_two_hinges_hangs_on_both_alike():
     assert_allclose(start.w[[2, 8]], -0.5 * 4.0 * 9.81, rtol=1e-6, atol=0)
     with pytest.raises(ModelError, match="redundant: expected one of refuse, minimum-norm"):
         System([door], joints, redundant="drop")
+
+
+@pytest.mark.parametrize(("share", "is_told"), [(0.9, False), (1.1, True)])
+def test_friction_that_raises_its_own_reaction_above_it_is_told(share, is_told, caplog):
+    """Friction c |N| on an eccentric hinge accelerates by c |N| / I, which adds m d c |N| / I to the reaction N."""
+    m, I_z, arm = 2.0, 0.18, np.array([0.3, -0.2, 0.1])
+    d = np.hypot(*arm[:2])
+    c = share * (I_z + m * d**2) / (m * d)
+    body = RigidBody("arm", m, np.diag([0.11, 0.15, I_z]), position=-arm, omega_B=(0, 0, 3.0))
+    hinge = RevoluteJoint("hinge", Marker(GROUND), Marker("arm", position=arm), axis=(0, 0, 1))
+    rub = JointForce("rub", "hinge", "angle", friction_coefficient=c)
+    with caplog.at_level(logging.WARNING):
+        start = consistent_state(System([body], [hinge], [rub, Gravity((1.0, -9.81, 0))]))
+    assert ("accelerations at the start were not found" in caplog.text) == is_told
+    if not is_told:  # I u_dot = moment of the reaction - c |N|, the reaction from m a = gravity + N
+        omega_dot = start.u_dot[5]
+        N = m * (start.u_dot[:3] - np.array([1.0, -9.81, 0]))
+        moment = np.cross(arm, N)[2] - c * np.hypot(*N[:2])
+        assert_allclose(I_z * omega_dot, moment, rtol=1e-6, atol=0)
