@@ -215,7 +215,8 @@ class CholeskyFactor:
                 row = int(self._fronts.order[failed - 1])
                 raise FactorizationError(f"cholesky: a pivot is zero or negative (row {row} of {self.n})")
             del F
-            left[k] = stack if n_left == n_stack else stack[:n_left].copy()
+            stack.resize(n_left, refcheck=False)  # in place, because a copy would touch new memory
+            left[k] = stack
             self._panels.put(k, panels)  # (3)
 
         with one_blas_thread():
