@@ -137,6 +137,8 @@ def integrate_many(
     ------
     ModelError
         Before the first run, if a path, a sensor or a time is wrong, or a parameter changes the topology of the system.
+    ProcessError
+        If the system has a function that cannot be sent to other processes; workers = 1 computes it here.
     WorkerError
         If no workers are available.
     """
@@ -205,7 +207,7 @@ class RunRow:
     notes: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class OneRun:
     """The function that computes one run, a task of `Campaign`; a process receives the system once."""
 
@@ -215,6 +217,10 @@ class OneRun:
     t: Array  #: output times, (n_t,)
     given: tuple[Any, ...]  #: integrator, end and step of the run
     options: dict[str, Any]  #: other arguments of `integrate`
+
+    def __repr__(self) -> str:
+        """Return the name by which a message about sending the task calls it."""
+        return f"system {self.system.name!r}"
 
     def __call__(self, values: tuple[float, ...]) -> RunRow:
         """Return the row of a run."""

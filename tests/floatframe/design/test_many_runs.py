@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 import cms
 import floatframe as ff
+from fe_models.foundation.tasks.task_map import ProcessError
 from floatframe.design.gradients.parameters import with_value
 from floatframe.design.many_runs import integrate_many
 from floatframe.errors import ModelError, ResultsError
@@ -142,6 +143,20 @@ def test_a_number_that_changes_the_topology_is_refused_by_its_name():
 def test_wrong_tables_are_refused_before_the_first_run(table, words):
     with pytest.raises(ModelError, match=words):
         integrate_many(general_system(), table, METHOD, **TIMES, workers=1)
+
+
+def test_a_function_that_no_other_process_can_find_is_told_and_runs_here():
+    def push(t, x, v, z, Q, z_dot):
+        Q[0] = 1.0
+
+    body = ff.RigidBody("arm", 1.0, np.eye(3), (0.3, 0.1, 0.0))
+    pin = ff.RevoluteJoint("pin", ff.Marker(ff.GROUND), ff.Marker("arm"), axis=(0.6, 0.8, 0.0))
+    force = ff.UserForce("push", {"turn": "pin.angle"}, ["turn"], function=push)
+    system = ff.System([body], [pin], [force], name="swing")
+    given = {"bodies.arm.mass": [1.0, 2.0]}, METHOD, 0.01, 1e-3
+    with pytest.raises(ProcessError, match="system 'swing' cannot be sent to other processes"):
+        integrate_many(system, *given, sensors=["pin.angle"], workers=2)
+    assert integrate_many(system, *given, sensors=["pin.angle"], workers=1).n_failed == 0
 
 
 def test_wrong_sensors_and_times_are_refused_before_the_first_run():
