@@ -1,4 +1,4 @@
-"""Many runs of one system, by `integrate_many` and by a sweep, beside single runs: runs per second, in one run.
+"""Many runs of one system beside single runs: runs per second by the processor.
 
     python -m benchmarks.many_runs                       # some three minutes on two cores
     python -m benchmarks.many_runs --runs 1000
@@ -144,15 +144,10 @@ def measured(n_runs: int, n_single: int) -> tuple[Cost, dict[str, Cost], float]:
 def figures(short: bool) -> dict[str, float]:
     """Return what the watch keeps."""
     single, each, _ = measured(*((48, 16) if short else (1000, 50)))
-    found = {
-        f"{name}, by the processor, speedup": cost.n * single.processor / cost.processor
-        for name, cost in each.items()
-        if "integrate_many" in name or "sweep" in name
-    }
-    plain, many = each.pop("single run without checks"), each["integrate_many without checks, 2 processes"]
-    found["the last over single runs without checks, speedup"] = many.n * plain.processor / many.processor
-    one, two = each["runs without checks, 1 thread"], each["runs without checks, 2 threads"]
-    return found | {"two threads over one, by the clock, speedup": one.clock / two.clock}
+    two = [name for name, cost in each.items() if cost.n == 2]
+    found = {f"{name}, speedup": 2 * single.processor / each[name].processor for name in two}
+    plain, many = each["single run without checks"], each["integrate_many without checks, 2 processes"]
+    return found | {"neither with checks, speedup": 2 * plain.processor / many.processor}
 
 
 def main() -> None:

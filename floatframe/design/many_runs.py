@@ -254,7 +254,8 @@ class OneRun:
 
     def at_output_times(self, t: Array, values: Array) -> Array:
         """Return the values at the output times, (n_t, n): of the last row at each time, NaN where there is none."""
-        slack = SAME_TIME * (self.t[1] - self.t[0])
+        _, _, h = self.given
+        slack = SAME_TIME * h
         k = np.searchsorted(t, self.t + slack) - 1
         return np.where((np.abs(t[k] - self.t) <= slack)[:, None], values[k], np.nan)
 

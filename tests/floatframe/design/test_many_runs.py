@@ -167,7 +167,8 @@ def test_wrong_sensors_and_times_are_refused_before_the_first_run():
         integrate_many(system, table, METHOD, -1.0, 1e-3, workers=1)
     with pytest.raises(ModelError, match="sensors: expected at least one, system 'system' has none"):
         integrate_many(replace(system, sensors=()), table, METHOD, **TIMES, workers=1)
-    many = integrate_many(system, table, METHOD, **TIMES, workers=1)
+    many = integrate_many(system, table, METHOD, **dict(TIMES, output_every=1000), workers=1)
+    assert (many.errors, many.t.tolist()) == (("",), [0.0])
     with pytest.raises(ResultsError, match="no column 'w'; choices: size, x, y, z"):
         many.column("tip", "w")
     with pytest.raises(ResultsError, match="no sensor 'tap'; did you mean 'tip'"):
