@@ -90,7 +90,9 @@ def test_coordinates_and_columns_are_sensors_too_and_the_state_at_the_start_is_g
 
 def test_after_an_event_that_ends_a_run_its_row_has_no_numbers():
     hit = Event("hit", "speed.size", 0.65, "falling", stop=True)
-    system = replace(general_system(ff.sensors.PlaceSensor("speed", ff.Marker("ball"), "velocity")), events=[hit])
+    mark = Event("mark", at=0.0021, record=True)  # a row between the output times
+    speed = ff.sensors.PlaceSensor("speed", ff.Marker("ball"), "velocity")
+    system = replace(general_system(speed), events=[hit, mark])
     table = {"forces.touch.stiffness": [3e5, 1.0]}
     many = integrate_many(system, table, METHOD, **TIMES, workers=1)
     assert many.n_failed == 0
@@ -99,6 +101,7 @@ def test_after_an_event_that_ends_a_run_its_row_has_no_numbers():
     for row, stiffness in enumerate(table["forces.touch.stiffness"]):
         motion = ff.integrate(with_value(system, "forces.touch.stiffness", stiffness), METHOD, **TIMES)
         at = np.isin(motion.t, many.t)
+        assert np.abs(motion.t[~at] - 0.0021).min() < 1e-9
         assert_array_equal(many.column("tip", "x")[row, : lengths[row]], motion.sensor("tip").x[at])
 
 
