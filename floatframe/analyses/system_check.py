@@ -253,10 +253,10 @@ def vibration_record(system: System, found: SystemVibrations) -> QualityRecord:
     f, words = found.frequencies * hertz, "no vibration"
     if len(f):
         words = (
-            f"{len(f)} vibrations at the start, from {f[0]:.4g} Hz (mostly body {found.bodies[0]!r}) to {f[-1]:.4g} Hz "
-            f"(mostly body {found.bodies[-1]!r})"
+            f"{len(f)} vibration{'s' * (len(f) != 1)} at the start, from {f[0]:.4g} Hz (mostly body "
+            f"{found.bodies[0]!r}) to {f[-1]:.4g} Hz (mostly body {found.bodies[-1]!r})"
         )
-    words += f"; {found.n_free} motions without stiffness" if found.n_free else ""
+    words += f"; {found.n_free} motion{'s' * (found.n_free != 1)} without stiffness" if found.n_free else ""
     words += f"; {found.n_unstable} with negative stiffness" if found.n_unstable else ""
     return record("vibrations", "Vibrations", "info", words)
 
