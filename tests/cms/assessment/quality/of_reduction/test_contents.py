@@ -212,6 +212,23 @@ def test_a_load_on_the_interface_that_carries_the_frame_has_no_modal_forces(soli
     assert bench.record("load-cases", wrong).verdict in ("warn", "fail")
 
 
+def test_loads_to_which_the_modes_answer_exactly_leave_only_rounding_out(solid):
+    """Constraint modes answer loads at the interfaces: what is left out is noise, which differs between computers."""
+    modes = cms.modes.craig_bampton_ir(solid.body, n_modes=3)
+    bench = Bench(solid.body, modes, ReductionOptions(frame=cms.TisserandFrame(), stress=False))
+    reduced, left_out = bench.reduced, bench.reduced.errors.left_out
+    forces = np.concatenate([each.Psi for each in reduced.interfaces])
+    energy = (forces**2 / np.diag(reduced.K)).sum(axis=1).max()
+    noise = np.sqrt(energy) * np.random.default_rng(1).choice([-1.0, 1.0], size=left_out.interfaces.shape)
+
+    def verdict(size):
+        other = replace(left_out, interfaces=left_out.interfaces + size * noise)
+        return bench.record("error-estimates", replace(reduced, errors=replace(reduced.errors, left_out=other))).verdict
+
+    assert verdict(1e-9) == "pass"
+    assert verdict(1e-2) == "fail"
+
+
 @pytest.mark.parametrize("what", [
     "3C of wrong sign", "4C and 5C beside the diagonal of wrong sign", "P transposed", "stress of the nodes shuffled",
     "stress of the modes shuffled", "stress yz and xy exchanged", "damping none", "labels of the modes shuffled",
