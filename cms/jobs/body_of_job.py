@@ -206,6 +206,10 @@ def job_body(
     ----------
     job
         A job file, or a job that has been read.
+    stages
+        Receives durations and progress of the stages; None: neither is reported.
+    on_report
+        Receives the mesh report before it is checked.
     source
         Solid mesh of the job without unused nodes, if it is known, which is not read or checked again; or its deck.
     ranks

@@ -67,7 +67,13 @@ def rotated(R: Array, a: Array) -> Array:
 
 
 def rotation_matrix(p: Array) -> Array:
-    """Return R_GB, (..., 3, 3), for Euler parameters p = (w, x, y, z), (..., 4): v_G = R_GB @ v_B."""
+    """Return R_GB, (..., 3, 3), for Euler parameters p = (w, x, y, z), (..., 4): v_G = R_GB @ v_B.
+
+    Parameters
+    ----------
+    p
+        Euler parameters of length one, (..., 4).
+    """
     p = np.asarray(p, dtype=float)
     # for a single rotation, Python numbers are four times as fast as arrays of length one
     w, x, y, z = p.tolist() if p.ndim == 1 else (p[..., k] for k in range(4))

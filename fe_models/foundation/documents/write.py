@@ -30,6 +30,13 @@ def document_content(document: Document, suffix: str) -> bytes:
 def write_document(document: Document, path: str | os.PathLike[str]) -> Path:
     """Write a document in the format of the suffix, one of `DOCUMENTS`; the file is complete or not written.
 
+    Parameters
+    ----------
+    document
+        A report, such as `cms.assessment.report.comparison_document` makes.
+    path
+        Path of the file, .html or .pdf.
+
     Raises
     ------
     TableError

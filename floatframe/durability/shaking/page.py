@@ -39,7 +39,13 @@ MOST_MODES = 40  #: largest number of modes in the table of effective masses
 
 
 def shake_document(result: ShakeResult) -> Document:
-    """Return the document."""
+    """Return the report of a shake computation, which `fe_models.files.write_document` writes.
+
+    Parameters
+    ----------
+    result
+        What `shake` returned.
+    """
     title = result.job.title or f"{result.model.name} on its base"
     sections = [summary_section(result), mass_section(result)]
     sections += [sine_section(result, run, k) for k, run in enumerate(result.sine)]

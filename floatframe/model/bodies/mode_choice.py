@@ -19,6 +19,13 @@ def with_modes(body: ReducedBody, modes: Sequence[int]) -> ReducedBody:
     Mass, inertia, interfaces and nodes are kept. Stress points, the columns of the mode set and the data for another
     body frame are removed. Results have fewer modes than the file, so that films of them need this body.
 
+    Parameters
+    ----------
+    body
+        The reduced body, which does not change.
+    modes
+        Numbers of the modes, from zero.
+
     Raises
     ------
     ModelError
