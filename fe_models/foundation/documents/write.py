@@ -35,7 +35,7 @@ def write_document(document: Document, path: str | os.PathLike[str]) -> Path:
     document
         A report, such as `cms.assessment.report.comparison_document` makes.
     path
-        Path of the file, .html or .pdf.
+        Path of the file: .html, .pdf or .json.
 
     Raises
     ------

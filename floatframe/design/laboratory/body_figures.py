@@ -1,7 +1,7 @@
 """Figures of the errors of mode sets relative to the full model: over the number of coordinates and over time."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -9,16 +9,13 @@ from floatframe.design.laboratory.body_study import SetError
 from floatframe.design.laboratory.figures import COLORS, MARKERS
 from floatframe.errors import ResultsError
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 __all__ = ["error_figure"]
 
 FLOOR = 1e-6  #: smallest error in figures; smaller errors are drawn at this value
 
 
-def error_figure(results: Sequence[SetError], *, n_shown: int) -> "Figure":
-    """Return a figure of one loading: the greatest errors over modal coordinates, and epsilon_K over time.
+def error_figure(results: Sequence[SetError], *, n_shown: int) -> Any:
+    """Return a figure (Matplotlib) of one loading: largest errors over modal coordinates, and epsilon_K over time.
 
     Parameters
     ----------
