@@ -8,18 +8,26 @@ import argparse
 import logging
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 import scipy.linalg as la
 
 import fe_models as fm
+from cms.body.reduced_body import BodyFrame
 from cms.errors import CmsError
 from cms.modes.families.families import Families
 from cms.modes.mode_sets import MODE_SETS
 from cms.reduction.basis.free_basis import free_basis
-from cms.reduction.error_estimates import EnlargedSpace, error_estimates, response_errors, response_loads
+from cms.reduction.error_estimates import (
+    enlarged_space,
+    error_estimates,
+    inertia_loads,
+    response_errors,
+    response_loads,
+)
+from cms.reduction.mesh_error import mesh_errors
 from cms.reduction.reduction import reduce
 from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.errors import FeModelsError
@@ -29,6 +37,7 @@ from tests.campaign.random_bodies import random_body
 LEAST_RESPONSE = 1e-6  #: true error of a response, below which it is rounding
 NO_MASS = 1e-9  #: mu of a shape divided by that of the first, below which it has no mass
 LEAST, MOST = 1e-8, 0.5  #: true errors of frequency that are counted: below is rounding, above is no approximation
+MEAN_AXES = BodyFrame("tisserand", np.zeros(3))
 SETS = [name for name in MODE_SETS if name != "user-basis"]
 
 
@@ -84,13 +93,13 @@ def judged(n: int) -> tuple[int, dict[str, np.ndarray], dict[str, np.ndarray]]:
                     continue
                 try:
                     basis = free_basis(body, modes, families)
-                    errors = error_estimates(families, modes, basis)
+                    errors = error_estimates(families, modes, basis, basis.Phi, MEAN_AXES)
                 except CmsError:
                     continue
                 k = min(len(errors.frequency), len(exact))
                 found[name] += zip(basis.frequencies()[:k] / exact[:k] - 1, errors.frequency[:k], strict=True)
-                whole = EnlargedSpace(errors.bound, mu, np.zeros((0, 0)), loads.T @ X)
-                responses[name] += zip(response_errors(basis, whole, loads), errors.response, strict=True)
+                true = response_errors(basis, len(errors.frequency), loads, loads.T @ X, mu)
+                responses[name] += zip(true, errors.response, strict=True)
     return n_bodies, *(
         {name: np.array(pairs).reshape(-1, 2) for name, pairs in each.items()} for each in (found, responses)
     )
@@ -122,15 +131,25 @@ def print_cost(n: int, n_modes: int) -> None:
     """Print the time of the estimates beside that of the reduction, in processor time and by the clock."""
     body = fm.couple(bar(nx=4 * n, ny=n, nz=n, width=0.25, height=0.25, kind="tetra10"))
     seconds = {}
+
+    def timed(name: str, work: Callable[[], Any]) -> Any:
+        began = time.perf_counter(), time.process_time()
+        found = work()
+        seconds[name] = time.perf_counter() - began[0], time.process_time() - began[1]
+        return found
+
     with Families(body) as families:
-        began = time.perf_counter(), time.process_time()
+        reduced = timed(
+            "set and reduction",
+            lambda: reduce(families, MODE_SETS["craig-bampton"](families, n_modes=n_modes), errors=False),
+        )
         modes = MODE_SETS["craig-bampton"](families, n_modes=n_modes)
-        reduced = reduce(families, modes, errors=False)
-        seconds["set and reduction"] = time.perf_counter() - began[0], time.process_time() - began[1]
         basis = free_basis(body, modes, families)
-        began = time.perf_counter(), time.process_time()
-        errors = error_estimates(families, modes, basis)
-        seconds["estimates"] = time.perf_counter() - began[0], time.process_time() - began[1]
+        mesh_errors(body, basis, 1)  # compiles
+        errors = timed("estimates", lambda: error_estimates(families, modes, basis, basis.Phi, MEAN_AXES))
+        n_judged, loads = len(errors.frequency), (response_loads(body), inertia_loads(families))
+        timed("reduction errors", lambda: enlarged_space(families, basis, n_judged, *loads))
+        timed("mesh errors", lambda: mesh_errors(body, basis, n_judged))
     print(f"{body.n_dof} dofs, {reduced.n_q} modes, {len(errors.frequency)} of them judged")
     for name, (clock, processor) in seconds.items():
         print(f"{name:20s}{clock:8.1f} s by the clock, {processor:8.1f} s of the processors")

@@ -21,13 +21,19 @@ is K-orthogonal to V, because phi is a Galerkin solution.
     sum_j omega² / theta_j y_j e_j. The e_j of judged modes are in the span already. Above them y_j is nearly
     phi_jᵀ b / theta_j, because omega² is less than theta_j, and one column for each load has the sum of
     phi_jᵀ b / theta_j² e_j. The responses in the enlarged span and in V are compared.
+(5) Corrections by fewer solutions. All corrections are the parts beside V of G F, with one load f_j of F for each. Sets
+    of constraint modes and eigenmodes have corrections that span no more than n_h columns: K_II⁻¹ M Psi_C. So G is
+    applied to n_h random sums of the loads [2]_, and their parts beside V get a K-orthonormal basis Q. Correction j has
+    the energy p_j = |Qᵀ f_j|² in its span. Two more sums with random signs and the weights 1 / sqrt(p_j) have outside Q
+    the mean energy sum_j r_j / p_j, where r_j is the energy that correction j lacks. The bound (1) contains this sum
+    times p_j. If the sum is too large, G is applied to every load.
 
 References
 ----------
 .. [1] B. N. Parlett, The Symmetric Eigenvalue Problem, SIAM 1998, chapters 10 and 11.
+.. [2] Halko, Martinsson & Tropp (2011), SIAM Review 53, 217-288.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
@@ -37,9 +43,10 @@ import scipy.linalg as la
 from cms.body.error_estimates import ErrorEstimates
 from cms.body.reduced_body import BodyFrame
 from cms.errors import BodyError
-from cms.linear_algebra.independent import Products
+from cms.linear_algebra.independent import DisplacementColumns, Products
 from cms.modes.families.families import Families
 from cms.modes.families.receptance import boundary_scale
+from cms.modes.families.static_modes import ROUNDING_ENERGY
 from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.free_basis import FreeBasis
 from cms.reduction.left_out_modes import left_out_modes
@@ -51,7 +58,9 @@ from fe_models.foundation.tall.columns import combine, dots, gram, inner, subtra
 __all__ = ["FrequencyErrors", "energy_error", "error_estimates", "frequency_errors", "require_one_process"]
 
 JUDGED = 30  #: number of judged modes of a set without vibration modes, which has no cutoff
-RANDOM, STEPS, SEED = 6, 2, 20  #: number of random columns of (3), their steps of inverse iteration, and their seed
+RANDOM, SEED = 6, 20  #: number of random columns of (3), and their seed
+TESTS, MISSING = 2, 0.01  #: number of tests of (5), and the sum of relative energies that corrections may lack
+SMALL = 1e-4  #: size of a correction relative to its mode, below which p_j in (5) is that of this size
 FREQUENCY_ROUNDING = 1e-10  #: estimated error of a frequency, below which it is rounding
 EXACT = 1e-7  #: bound b, below which a mode is exact within rounding
 INDEPENDENT = 1e-10  #: smallest eigenvalue of the scaled Gram matrix of independent corrections
@@ -66,7 +75,8 @@ LOWEST = 0.05  #: lowest frequency of a response divided by the first elastic on
 POINTS = 33  #: number of frequencies around each mode at which responses are compared
 METHOD = (
     "frequency, shape, response: estimates by the Rayleigh-Ritz method with one step of inverse iteration; bound: "
-    "rigorous, from the residual; static responses: computed, not estimated"
+    "rigorous, from the residual (random tests measure what its samples leave out); static responses: computed, not "
+    "estimated"
 )
 
 
@@ -75,7 +85,7 @@ class FrequencyErrors:
     """Errors of the lowest free frequencies; see `ErrorEstimates`."""
 
     frequency: Array  #: estimate of f_reduced / f - 1, (n,)
-    bound: Array  #: rigorous bound b, (n,)
+    bound: Array  #: bound b, (n,)
     shape: Array  #: estimate of the error of the shape in the norm of strain energy, (n,)
 
 
@@ -87,7 +97,8 @@ class EnlargedSpace:
     mu: Array  #: 1 / omega² of the new shapes, descending, (n_W,)
     Y: Array  #: part of each shape of V, scaled to unit strain energy, in each new shape, (n_V, n_W)
     motion: Array  #: motion in the directions of the loads in the new shapes of unit strain energy, (n_loads, n_W)
-    X: Array  #: corrections, residual responses and random columns, K-orthogonal to V, (n_dof, n_X)
+    X: DisplacementColumns  #: corrections, residual responses and random columns, K-orthogonal to V, (n_dof, n_X)
+    inertia: Array  #: error of the set for each inertia load; see `ErrorEstimates`, (n_r,)
 
 
 def require_one_process(body: FEBody) -> None:
@@ -123,62 +134,154 @@ def error_estimates(
     n = min(max(n, 1), len(frequencies))
     mesh = mesh_errors(families.body, basis, n)
     loads, interface = interface_errors(families, basis)
-    interface = four_digits(interface, STATIC_ROUNDING)
-    inertia = four_digits(energy_error(families.body, basis, families.Psi_H), STATIC_ROUNDING)
     directions = response_loads(families.body)
-    has_statics = not (np.nan_to_num(interface).any() or np.nan_to_num(inertia).any())
-    space = enlarged_space(families, basis, n, directions, has_statics=has_statics)
+    space = enlarged_space(families, basis, n, directions, inertia_loads(families))
     errors = errors_of_modes(basis, space)
     return ErrorEstimates(
         four_digits(errors.frequency, FREQUENCY_ROUNDING),
         four_digits(errors.bound),
         four_digits(errors.shape),
-        four_digits(response_errors(basis, space, directions), RESPONSE_ROUNDING),
+        four_digits(response_errors(basis, n, directions, space.motion, space.mu), RESPONSE_ROUNDING),
         loads,
-        interface,
-        inertia,
+        four_digits(interface, STATIC_ROUNDING),
+        four_digits(space.inertia, STATIC_ROUNDING),
         METHOD,
         datetime.now(UTC).date().isoformat(),
         mesh=four_digits(mesh.frequency, FREQUENCY_ROUNDING) if mesh.sign else np.zeros(0),
         mesh_sign=mesh.sign,
         mesh_method=mesh.method,
-        left_out=left_out_modes(families, basis, space.X, Phi, frame),
+        left_out=left_out_modes(families, basis, space.X.X, Phi, frame),
     )
 
 
 def frequency_errors(families: Families, basis: FreeBasis, n: int) -> FrequencyErrors:
-    """Estimate the errors of the lowest n free frequencies and shapes: n + 12 solutions with the factorisation."""
-    return errors_of_modes(basis, enlarged_space(families, basis, n, np.zeros((families.body.n_dof, 0))))
+    """Estimate the errors of the lowest n free frequencies and shapes."""
+    none = np.zeros((families.body.n_dof, 0))
+    return errors_of_modes(basis, enlarged_space(families, basis, n, none, none))
 
 
-def enlarged_space(
-    families: Families, basis: FreeBasis, n: int, directions: Array, *, has_statics: bool = False
-) -> EnlargedSpace:
+def enlarged_space(families: Families, basis: FreeBasis, n: int, directions: Array, inertia: Array) -> EnlargedSpace:
     """Add the corrections of the lowest n modes and of the responses to loads, and random columns, to the set.
 
     Parameters
     ----------
-    directions
-        Load columns, (n_dof, n_loads).
-    has_statics
-        Whether the set contains the static responses to these loads.
+    directions, inertia
+        Loads of the responses, (n_dof, n_loads), and `inertia_loads`, (n_dof, n_r).
     """
-    products, V, omega2 = Products.of_body(families.body), basis.Phi, basis.omega2
-    theta = omega2[:n]
-    loads, above = [theta * (products.M @ V[:, :n])], V[:, n:][:, basis.is_massive[n:]]
-    share = inner(above, directions) / omega2[n : n + above.shape[1], None]
-    if directions.shape[1] and not has_statics:
-        loads.append(directions)
-    if directions.shape[1] and above.shape[1]:
-        loads.append(products.M @ combine(above, share))
-    U = families.flexibility(np.hstack(loads))  # (4): the part in V is taken out below
-    E = U[:, :n] - V[:, :n]
-    K_E = products.K @ E
-    bound = np.sqrt(np.maximum(dots(E, K_E), 0.0) / theta)  # (1)
-    subtract(E, V, inner(V, K_E) / omega2[:, None])  # rounding
-    X = [E[:, bound > EXACT], independent_part(basis, products, U[:, n:]), *random_columns(families, basis, products)]
-    beside = np.hstack(X)
-    return EnlargedSpace(bound, *ritz_shapes(basis, beside, products, directions), beside)
+    loads = correction_loads(families, basis, n, directions)
+    V, M, size = basis.Phi, loads.products.M, loads.size
+    noise = M @ np.random.default_rng(SEED).standard_normal((families.body.n_dof, RANDOM))  # (3)
+    sums, random = weights_of_sums(size, len(families.h)), np.random.default_rng(SEED + 2)
+    (X, smooth, _), beside, whole = parts_beside(families, loads, loads.sums(sums), noise, inertia)  # (5)
+    energy, T = energy_inside(loads, X)
+    p = np.maximum(energy, (SMALL * size) ** 2)
+    signs = random.choice([-1.0, 1.0], (len(p), TESTS if sums.shape[1] < len(p) else 0))
+    noise = M @ (smooth.X - combine(V, inner(V, smooth.MX)))
+    (tests, smoother), *_ = parts_beside(families, loads, loads.sums(signs / np.sqrt(p)[:, None]), noise)
+    outside = dots(tests.X, tests.KX).sum() - ((inner(tests.KX, X.X) @ T) ** 2).sum()
+    lacking = max(outside, 0.0) / TESTS
+    if lacking > MISSING:
+        (X,), *_ = parts_beside(families, loads, loads.sums(np.eye(len(p))))
+        energy, lacking = energy_inside(loads, X)[0], 0.0
+    bound = np.sqrt((energy + lacking * p)[:n] / basis.omega2[:n])  # (1)
+    X = X.beside(tests).beside(smooth).beside(smoother)
+    of_inertia = slice(len(whole) - inertia.shape[1], None)
+    errors = inertia_errors(beside[of_inertia], whole[of_inertia])
+    return EnlargedSpace(bound, *ritz_shapes(basis, X, directions), X, errors)
+
+
+@dataclass(frozen=True, eq=False)
+class CorrectionLoads:
+    """Loads F = [M V, L] C; the parts of their elastic responses beside V are the corrections."""
+
+    basis: FreeBasis  #: V
+    products: Products
+    directions: Array  #: L, (n_dof, n_loads)
+    C: Array  #: coefficients, (n_V + n_loads, n_F)
+
+    @property
+    def size(self) -> Array:
+        """Root of the energy of the part of each response in V, (n_F,); the largest one in place of zero."""
+        mass = np.diag(self.basis.is_massive.astype(float))
+        V_F = np.hstack([mass, inner(self.basis.Phi, self.directions)]) @ self.C
+        size = np.sqrt((V_F**2 / self.basis.omega2[:, None]).sum(axis=0))
+        return np.where(size > 0, size, size.max())
+
+    def sums(self, S: Array) -> Array:
+        """Return F S, (n_dof, k)."""
+        of_modes, of_directions = np.split(self.C @ S, [len(self.basis.omega2)])
+        F = self.products.M @ combine(self.basis.Phi, of_modes)
+        subtract(F, self.directions, -of_directions)
+        return F
+
+    def work(self, X: DisplacementColumns) -> Array:
+        """Return Xᵀ F, (k, n_F)."""
+        return np.hstack([inner(X.MX, self.basis.Phi), inner(X.X, self.directions)]) @ self.C
+
+
+def correction_loads(families: Families, basis: FreeBasis, n: int, directions: Array) -> CorrectionLoads:
+    """Return the loads theta M phi of the lowest n modes, and those of the responses by (4)."""
+    n_V, n_loads = len(basis.omega2), directions.shape[1]
+    above = np.arange(n, n_V)[basis.is_massive[n:]]
+    share = np.zeros((n_V + n_loads, n_loads))
+    share[above] = inner(basis.Phi[:, above], directions) / basis.omega2[above, None]
+    C = [np.eye(n_V + n_loads, n) * basis.omega2[:n], np.eye(n_V + n_loads)[:, n_V:]]
+    if len(above):
+        C.append(share)
+    return CorrectionLoads(basis, Products.of_body(families.body), directions, np.hstack(C))
+
+
+def weights_of_sums(size: Array, n_sums: int) -> Array:
+    """Return weights of the loads in random sums, (n_F, n_sums); the identity if loads are hardly more than sums.
+
+    Parameters
+    ----------
+    size
+        Root of the energy of each response in V, (n_F,).
+    """
+    if len(size) <= n_sums + TESTS:
+        return np.eye(len(size))
+    return np.asarray(np.random.default_rng(SEED + 1).standard_normal((len(size), n_sums)) / size[:, None])
+
+
+def parts_beside(
+    families: Families, loads: CorrectionLoads, *blocks: Array
+) -> tuple[list[DisplacementColumns], Array, Array]:
+    """Return the elastic responses to blocks of loads without their parts in V.
+
+    Returns
+    -------
+    parts
+        One block of columns, K-orthogonal to V, for each block of loads. Responses in V are left out.
+    beside, whole
+        Energy of the part beside V and of the whole of each response, (k,).
+    """
+    V, omega2, products = loads.basis.Phi, loads.basis.omega2[:, None], loads.products
+    F = np.hstack(blocks)
+    U = families.flexibility(F)
+    whole = dots(U, F)
+    subtract(U, V, inner(V, F) / omega2)
+    K_U = products.K @ U
+    subtract(U, V, inner(V, K_U) / omega2)  # rounding
+    M_U, beside = products.M @ U, dots(U, K_U)
+    of_block = np.repeat(np.arange(len(blocks)), [each.shape[1] for each in blocks])
+    kept = [np.flatnonzero((of_block == k) & (beside > EXACT**2 * whole)) for k in range(len(blocks))]
+    parts = [DisplacementColumns(U[:, k], K_U[:, k], M_U[:, k], np.zeros((0, len(k)))) for k in kept]
+    return parts, beside, whole
+
+
+def energy_inside(loads: CorrectionLoads, X: DisplacementColumns) -> tuple[Array, Array]:
+    """Return the energy of each correction in the span of X, at least that of rounding, and T of `orthonormal`."""
+    T = orthonormal(X)
+    return np.maximum(((T.T @ loads.work(X)) ** 2).sum(axis=0), (EXACT * loads.size) ** 2), T
+
+
+def orthonormal(X: DisplacementColumns) -> Array:
+    """Return T for which the columns X T have unit strain energy and are K-orthogonal; dependent ones are left out."""
+    size = 1 / np.sqrt(np.maximum(dots(X.X, X.KX), np.finfo(float).tiny))
+    energies, T = la.eigh(gram(X.X, X.KX) * np.outer(size, size))
+    is_independent = energies > INDEPENDENT
+    return np.asarray(size[:, None] * T[:, is_independent] / np.sqrt(energies[is_independent]))
 
 
 def errors_of_modes(basis: FreeBasis, space: EnlargedSpace) -> FrequencyErrors:
@@ -191,42 +294,14 @@ def errors_of_modes(basis: FreeBasis, space: EnlargedSpace) -> FrequencyErrors:
     return FrequencyErrors(frequency, space.bound, np.sqrt(np.maximum(1 - inside, 0.0)))
 
 
-def random_columns(families: Families, basis: FreeBasis, products: Products) -> Iterator[Array]:
-    """Yield the columns of (3) after each step of inverse iteration, K-orthogonal to the span of the set.
-
-    Each step begins M-orthogonal to the span. Columns that lie in the span are left out.
-    """
-    massive = basis.vibrating
-    F = products.M @ np.random.default_rng(SEED).standard_normal((families.body.n_dof, RANDOM))
-    for _ in range(STEPS):
-        X = families.flexibility(F)
-        F = products.M @ (X - combine(massive, inner(massive, products.M @ X)))
-        yield independent_part(basis, products, X)
-
-
-def independent_part(basis: FreeBasis, products: Products, X: Array) -> Array:
-    """Return columns that are K-orthogonal to the span of the set; those that lie in the span are left out."""
-    before = dots(X, products.K @ X)
-    for _ in range(2):
-        K_X = products.K @ X
-        subtract(X, basis.Phi, inner(basis.Phi, K_X) / basis.omega2[:, None])
-    return X[:, dots(X, K_X) > EXACT**2 * before]
-
-
-def ritz_shapes(basis: FreeBasis, X: Array, products: Products, directions: Array) -> tuple[Array, Array, Array]:
+def ritz_shapes(basis: FreeBasis, X: DisplacementColumns, directions: Array) -> tuple[Array, Array, Array]:
     """Return mu, Y and motion of `EnlargedSpace` by the Rayleigh-Ritz method in the span of V and X, VᵀKX = 0."""
-    omega = np.sqrt(basis.omega2)
-    K_X = products.K @ X
-    size = 1 / np.sqrt(np.maximum(dots(X, K_X), np.finfo(float).tiny))
-    energies, T = la.eigh(gram(X, K_X) * np.outer(size, size))
-    is_independent = energies > INDEPENDENT
-    T = size[:, None] * T[:, is_independent] / np.sqrt(energies[is_independent])
-    M_X = products.M @ X
-    beside = (inner(basis.Phi, M_X) / omega[:, None]) @ T
-    mass = np.block([[np.diag(static_factors(basis)), beside], [beside.T, T.T @ gram(X, M_X) @ T]])
+    omega, T = np.sqrt(basis.omega2), orthonormal(X)
+    beside = (inner(basis.Phi, X.MX) / omega[:, None]) @ T
+    mass = np.block([[np.diag(static_factors(basis)), beside], [beside.T, T.T @ gram(X.X, X.MX) @ T]])
     mu, Y = la.eigh(mass)
     mu, Y = np.maximum(mu[::-1], 0.0), Y[:, ::-1]
-    motion = np.hstack([inner(directions, basis.Phi) / omega, inner(directions, X) @ T]) @ Y
+    motion = np.hstack([inner(directions, basis.Phi) / omega, inner(directions, X.X) @ T]) @ Y
     return mu, Y[: len(omega)], motion
 
 
@@ -257,9 +332,16 @@ def unit_loads(n: int, most: int) -> Array:
     return np.eye(n) if n <= most else np.random.default_rng(SEED).choice([-1.0, 1.0], (n, SUMS))
 
 
-def response_errors(basis: FreeBasis, space: EnlargedSpace, directions: Array) -> Array:
-    """Return the error of the receptance between the loads around each judged mode, (n,); empty without loads."""
-    omega = np.sqrt(basis.omega2[: len(space.bound) if directions.shape[1] else 0])
+def response_errors(basis: FreeBasis, n: int, directions: Array, better: Array, mu: Array) -> Array:
+    """Return the error of the receptance between the loads around each judged mode, (n,); empty without loads.
+
+    Parameters
+    ----------
+    better, mu
+        Motion in the directions of the loads, (n_loads, n_W), and 1 / omega², (n_W,), of better shapes; see
+        `EnlargedSpace`.
+    """
+    omega = np.sqrt(basis.omega2[: n if directions.shape[1] else 0])
     if not len(omega):
         return np.zeros(0)
     middle = (omega[1:] + omega[:-1]) / 2
@@ -268,9 +350,7 @@ def response_errors(basis: FreeBasis, space: EnlargedSpace, directions: Array) -
     rigid = inner(directions, basis.N)
     return np.array(
         [
-            receptance_error(
-                np.linspace(low, high, POINTS), (motion, static_factors(basis)), (space.motion, space.mu), rigid
-            )
+            receptance_error(np.linspace(low, high, POINTS), (motion, static_factors(basis)), (better, mu), rigid)
             for low, high in zip(lowest, highest, strict=True)
         ]
     )
@@ -320,6 +400,23 @@ def interface_errors(families: Families, basis: FreeBasis) -> tuple[tuple[str, .
     z = np.zeros((len(families.h), len(names)))
     z[free.e] = free.solve_boundary(loads)
     return names, energy_error(families.body, basis, combine(families.Psi_C, z))
+
+
+def inertia_loads(families: Families) -> Array:
+    """Return the loads K Psi_H, (n_dof, n_r), which hold the interfaces of the accelerating body; rotations over length.
+
+    The load at the held dofs balances M Psi_R in the interior: -Psi_C,Iᵀ (M Psi_R)_I.
+    """
+    body = families.body
+    F = body.M @ (families.Psi_R / np.where(families.rigid_components >= 3, body.length, 1.0))
+    F[families.h] -= inner(families.Psi_C, F)
+    return np.asarray(F)
+
+
+def inertia_errors(beside: Array, whole: Array) -> Array:
+    """Return the relative energy error for each inertia load, (n_r,); NaN: no energy."""
+    has_energy = whole > ROUNDING_ENERGY * whole.max(initial=0.0)
+    return np.sqrt(np.maximum(beside, 0.0) / np.where(has_energy, whole, np.nan))
 
 
 def energy_error(body: FEBody, basis: FreeBasis, U: Array) -> Array:

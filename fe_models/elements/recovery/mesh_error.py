@@ -41,7 +41,7 @@ from fe_models.meshes.mesh import Mesh
 
 __all__ = ["EnergyErrors", "energy_errors", "powers_of_size", "surface_elements", "without_estimate"]
 
-SAMPLE_BYTES = 1e8  #: size of the sampled stress that is in memory at a time [bytes]
+SAMPLE_BYTES = 4e8  #: size of the sampled stress that is in memory at a time [bytes]
 #: cells whose reduced integration leaves out a part of the strain energy, also if their edges are straight
 UNDERINTEGRATED = ("hexahedron20", "hexahedron27", "wedge", "wedge15")
 EDGE = 0.1  #: share of a direction in n nᵀ, above which it is a normal of an edge or a corner
@@ -140,6 +140,11 @@ def powers_of_size(model: ElementModel | None) -> IntArray:
     return np.full(sum(len(group.cells) for group in shell.groups) if isinstance(shell, ShellModel) else 0, 2 + 2)
 
 
+def column_blocks(u: Array, bytes_of_column: float) -> list[Array]:
+    """Return blocks of equally many columns, whose samples are no larger than `SAMPLE_BYTES`."""
+    return np.array_split(u, max(1, int(np.ceil(u.shape[1] * bytes_of_column / SAMPLE_BYTES))), axis=1)
+
+
 # solids ---------------------------------------------------------------------------------------------------------------
 
 
@@ -170,15 +175,19 @@ def solid_errors(model: SolidModel, u: Array, loaded: IntArray) -> EnergyErrors:
     on_surface = np.flatnonzero(place[keys // len(tensors)] >= 0)
     P = free[place[keys[on_surface] // len(tensors)]]
     n_samples = sum(group.samples.shape[0] * group.samples.shape[1] for group in groups)
-    width = max(1, int(SAMPLE_BYTES / (48 * n_samples)))
     errors, energies = [], []
-    for first in range(0, u.shape[1], width):
-        columns = np.ascontiguousarray(u[:, first : first + width])
+    for block in column_blocks(u, 48 * n_samples):
+        columns = np.ascontiguousarray(block)
         k = columns.shape[1]
-        sampled = [cell_stress(model, kind, tensors, columns).reshape(-1, 6 * k) for kind in kinds]
-        recovered = recovery.at_nodes(np.concatenate(sampled)).reshape(-1, 6, k)
+        sampled = [cell_stress(model, kind, tensors, columns) for kind in kinds]
+        at_samples = [each.reshape(-1, 6 * k) for each in sampled]
+        recovered = recovery.at_nodes(np.concatenate(at_samples) if len(kinds) > 1 else at_samples[0])
+        recovered = recovered.reshape(-1, 6, k)
         recovered[on_surface] = P @ recovered[on_surface]  # (2)
-        parts = [cell_defects(model, kind, tensors, columns, rows[kind], recovered) for kind in kinds]
+        parts = [
+            cell_defects(model, kind, tensors, columns, rows[kind], sigma, recovered)
+            for kind, sigma in zip(kinds, sampled, strict=True)
+        ]
         errors.append(np.concatenate([part[0] for part in parts]))
         energies.append(np.concatenate([part[1] for part in parts]))
     return EnergyErrors(np.hstack(errors), np.hstack(energies), nonconforming_solid(model))
@@ -267,10 +276,18 @@ def brick_stress(nodes: Array, cells: IntArray, tensors: Array, u: Array) -> Ite
 
 
 def cell_defects(
-    model: SolidModel, kind: str, tensors: Array, u: Array, rows: IntArray, recovered: Array
+    model: SolidModel, kind: str, tensors: Array, u: Array, rows: IntArray, sampled: Array, recovered: Array
 ) -> tuple[Array, Array]:
-    """Return eta² and twice the strain energy of all cells of a type, (n_cells, k) each [J]."""
-    from fe_models.elements.solids.stress_kernels import add_stress_defects
+    """Return eta² and twice the strain energy of all cells of a type, (n_cells, k) each [J].
+
+    Parameters
+    ----------
+    rows
+        Row of `recovered` of each node of each cell, (n_cells, n_a).
+    sampled, recovered
+        Stress at the stress points, (n_cells, n_points, 6, k), and at the nodes, (n_rows, 6, k) [Pa].
+    """
+    from fe_models.elements.solids.stress_kernels import add_affine_defects, add_stress_defects
 
     cells, of_cell, nodes = model.mesh.cells[kind], model.of_cell[kind], model.mesh.nodes
     defect, energy = np.zeros((len(cells), u.shape[1])), np.zeros((len(cells), u.shape[1]))
@@ -282,11 +299,28 @@ def cell_defects(
             defect[part] = (d * (S @ d)).sum(axis=(1, 2))
             energy[part] = (sigma * (S @ sigma)).sum(axis=(1, 2))
         return defect, energy
-    fields = u.reshape(len(nodes), 3, -1)
-    rule = (table.values, table.gradients, table.weights)
-    inputs = (nodes, cells, of_cell, tensors, compliances, *rule, fields, rows, recovered)
-    in_threads(add_stress_defects, inputs, (defect, energy))
+    affine, others = affine_cells(model, kind)
+    if len(affine):
+        edges = nodes[cells[affine, 1:4]] - nodes[cells[affine, :1]]
+        element = reference_element(kind)
+        L_T = np.linalg.cholesky(table.values.T @ (table.weights[:, None] * table.values)).T.copy()
+        maps = (L_T, L_T @ element.extrapolation, element.stress.weights)
+        straight = (affine, np.linalg.det(edges), of_cell, compliances, *maps, rows, recovered, sampled)
+        in_threads(add_affine_defects, straight, (defect, energy))
+    if len(others):
+        rule = (table.values, table.gradients, table.weights)
+        inputs = (others, nodes, cells, of_cell, tensors, compliances, *rule, u.reshape(len(nodes), 3, -1), rows)
+        in_threads(add_stress_defects, (*inputs, recovered), (defect, energy))
     return defect, energy
+
+
+def affine_cells(model: SolidModel, kind: str) -> tuple[IntArray, IntArray]:
+    """Return the straight tetrahedra of a type, whose stress is in the span of its samples, and the other cells."""
+    cells = model.mesh.cells[kind]
+    is_affine = np.full(len(cells), kind == "tetra")
+    if kind == "tetra10":
+        is_affine = bends_of_cells(model.mesh.nodes, cells) <= CURVED
+    return np.flatnonzero(is_affine), np.flatnonzero(~is_affine)
 
 
 # shells ---------------------------------------------------------------------------------------------------------------
@@ -307,10 +341,8 @@ def shell_errors(model: ShellModel, u: Array) -> EnergyErrors:
         groups.append(PatchCells(patch, patch.shape[1], (), np.einsum("pc,nci->npi", shape, group.planes.corners)))
         n_samples += len(patch) * len(shape)
     recovery = patch_recovery(places, groups, 1, is_surface=True)
-    width = max(1, int(SAMPLE_BYTES / (8 * 24 * n_samples)))
     errors, energies = [], []
-    for first in range(0, u.shape[1], width):
-        columns = np.asarray(u)[:, first : first + width]
+    for columns in column_blocks(u, 8 * 24 * n_samples):
         k = columns.shape[1]
         resultants = [cell_resultants(group, columns) for group in model.groups]
         sampled = [

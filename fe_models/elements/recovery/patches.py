@@ -22,6 +22,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.threads import in_threads
 
 __all__ = ["PatchCells", "PatchRecovery", "patch_recovery"]
 
@@ -42,17 +43,23 @@ class PatchCells:
 
 @dataclass(frozen=True, eq=False)
 class PatchRecovery:
-    """The linear map from samples to nodes: for each term of the polynomial, its moments and their weights."""
+    """The linear map from samples to nodes: moments of the samples of each patch, and weights of these at nodes."""
 
-    moments: tuple[sp.csr_array, ...]  #: samples to patches, (n_patches, n_samples)
-    weights: tuple[sp.csr_array, ...]  #: patches to nodes, (n_nodes, n_patches)
+    inside: sp.csr_array  #: samples of each patch, (n_patches, n_samples), with unit entries
+    basis: Array  #: terms of the polynomial of each patch at its samples, (n_entries of inside, n_terms)
+    start: IntArray  #: first pair of each node, (n_nodes + 1,)
+    patches: IntArray  #: patch of each pair, (n_pairs,)
+    weights: Array  #: weights of the moments of the patch of each pair, (n_pairs, n_terms)
 
     def at_nodes(self, values: Array) -> Array:
         """Return the recovered values at the nodes, (n_nodes, k), of values at the samples, (n_samples, k)."""
-        found = self.weights[0] @ (self.moments[0] @ values)
-        for moment, weight in zip(self.moments[1:], self.weights[1:], strict=True):
-            found += weight @ (moment @ values)
-        return np.asarray(found)
+        from fe_models.elements.recovery.patch_kernels import write_moments, write_node_values
+
+        k = values.shape[1]
+        moments, found = np.empty((self.inside.shape[0], self.basis.shape[1], k)), np.empty((len(self.start) - 1, k))
+        in_threads(write_moments, (self.inside.indptr, self.inside.indices, self.basis, values), (moments,))
+        in_threads(write_node_values, (self.start, self.patches, self.weights, moments), (found,))
+        return found
 
 
 def patch_recovery(
@@ -109,12 +116,10 @@ def patch_recovery(
     node, patch = patches_of_nodes(number, groups)  # (4)
     if order == 1:
         node, patch = with_many_samples(inside, node, patch)
-    at = basis(patch, nodes[node] - center[patch]) / np.bincount(node, minlength=len(nodes))[node, None]
+    n_pairs = np.bincount(node, minlength=len(nodes))
+    at = basis(patch, nodes[node] - center[patch]) / n_pairs[node, None]
     at = np.einsum("ni,nij->nj", at, np.linalg.inv(G)[patch])
-    return PatchRecovery(
-        tuple(sp.csr_array((np.ascontiguousarray(each), inside.indices, inside.indptr), inside.shape) for each in b.T),
-        tuple(sp.csr_array((each, (node, patch)), (len(nodes), n_patches)) for each in at.T),
-    )
+    return PatchRecovery(inside, b, np.concatenate([[0], np.cumsum(n_pairs)]), patch, at)
 
 
 def samples_of_patches(number: IntArray, groups: Sequence[PatchCells], shape: tuple[int, int]) -> sp.csr_array:
@@ -140,8 +145,9 @@ def patches_of_nodes(number: IntArray, groups: Sequence[PatchCells]) -> tuple[In
             for parent in parents:
                 nodes.append(group.nodes[:, k])
                 corners.append(number[group.nodes[:, parent]])
-    pairs = np.unique(np.stack([np.concatenate(nodes), np.concatenate(corners)], axis=1), axis=0)
-    return pairs[:, 0], pairs[:, 1]
+    n_patches = len(corners[0])
+    pairs = np.unique(np.concatenate(nodes) * n_patches + np.concatenate(corners))
+    return pairs // n_patches, pairs % n_patches
 
 
 def with_many_samples(inside: sp.csr_array, node: IntArray, patch: IntArray) -> tuple[IntArray, IntArray]:

@@ -6,8 +6,8 @@ from numba import njit
 from fe_models.elements.solids.assembly_kernels import jacobian
 
 __all__ = [
-    "add_element_stress", "add_internal_forces", "add_stress_defects", "stress_and_products", "volume_at_nodes",
-    "write_cell_stress", "write_scalar_matrices",
+    "add_affine_defects", "add_element_stress", "add_internal_forces", "add_stress_defects", "stress_and_products",
+    "volume_at_nodes", "write_cell_stress", "write_scalar_matrices",
 ]  # fmt: skip
 
 jit = njit(cache=True, nogil=True, error_model="numpy")
@@ -239,20 +239,33 @@ def write_cell_stress(nodes, cells, of_cell, tensors, dN, u, part, n_parts, sigm
 
 
 @jit_fast
-def add_stress_defects(
-    nodes, cells, of_cell, tensors, compliances, N, dN, w, u, rows, recovered, part, n_parts, defect, energy
-):
-    """Add ∫ d · C⁻¹ d dV with d = recovered stress - stress, and ∫ sigma · C⁻¹ sigma dV, of a part of the elements.
+def add_product(d, S, factor, total):
+    """Add factor d · S d to total, (k,), for stress d, (6, k), and symmetric S, (6, 6), whose zeros are skipped."""
+    for b in range(d.shape[0]):
+        for c in range(b + 1):
+            s = (1.0 if b == c else 2.0) * S[b, c] * factor
+            if s == 0.0:
+                continue
+            d_b, d_c = d[b], d[c]
+            for k in range(total.size):
+                total[k] += s * d_b[k] * d_c[k]
 
-    u: displacement columns, (n_nodes, 3, k); recovered: stress at the nodes, (n_rows, 6, k); rows: its row for each
-    node of each element, (n_cells, n_a); compliances: C⁻¹ of every material, (n_materials, 6, 6); defect, energy:
-    (n_cells, k).
+
+@jit_fast
+def add_stress_defects(
+    chosen, nodes, cells, of_cell, tensors, compliances, N, dN, w, u, rows, recovered, part, n_parts, defect, energy
+):
+    """Add ∫ d · C⁻¹ d dV with d = recovered stress - stress, and ∫ sigma · C⁻¹ sigma dV, of a part of some elements.
+
+    chosen: indices of these elements; u: displacement columns, (n_nodes, 3, k); recovered: stress at the nodes,
+    (n_rows, 6, k); rows: its row for each node of each element, (n_cells, n_a); compliances: C⁻¹ of every material,
+    (n_materials, 6, 6); defect, energy: (n_cells, k).
     """
     n_k = u.shape[2]
     x = np.empty((cells.shape[1], 3))
     J, Q, H = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3, n_k))
     sigma, d = np.empty((6, n_k)), np.empty((6, n_k))
-    for e in range(part * cells.shape[0] // n_parts, (part + 1) * cells.shape[0] // n_parts):
+    for e in chosen[part * chosen.size // n_parts : (part + 1) * chosen.size // n_parts]:
         S = compliances[of_cell[e]]
         for a in range(cells.shape[1]):
             for i in range(3):
@@ -268,13 +281,40 @@ def add_stress_defects(
                     row, column = d[c], recovered[at, c]
                     for k in range(n_k):
                         row[k] += factor * column[k]
-            for b in range(d.shape[0]):
-                for c in range(b + 1):
-                    s = (1.0 if b == c else 2.0) * S[b, c] * w[q] * det
-                    if s == 0.0:
-                        continue
-                    d_b, d_c, sigma_b, sigma_c = d[b], d[c], sigma[b], sigma[c]
-                    of_defect, of_energy = defect[e], energy[e]
+            add_product(d, S, w[q] * det, defect[e])
+            add_product(sigma, S, w[q] * det, energy[e])
+
+
+@jit_fast
+def add_affine_defects(
+    chosen, jacobians, of_cell, compliances, from_nodes, from_samples, w, rows, recovered, sigma,
+    part, n_parts, defect, energy,
+):  # fmt: skip
+    """Add what `add_stress_defects` adds, for elements whose reference coordinates are affine.
+
+    The defect at node a is recovered stress - sum_p X_ap sigma_p, a polynomial in the span of the shape functions. With
+    their mass matrix L Lᵀ on the reference cell, the integral is det J times a sum over the rows of Lᵀ (nodal defects).
+    jacobians: det J of each chosen element; from_nodes: Lᵀ, upper triangular, (n_a, n_a); from_samples: Lᵀ X,
+    (n_a, n_points); w: weights of the stress points, (n_points,); recovered: (n_rows, 6, k); sigma: at the stress
+    points, (n_cells, n_points, 6, k).
+    """
+    n_a, n_k = from_nodes.shape[0], sigma.shape[3]
+    d = np.empty((6, n_k))
+    for place in range(part * chosen.size // n_parts, (part + 1) * chosen.size // n_parts):
+        e, det = chosen[place], jacobians[place]
+        S = compliances[of_cell[e]]
+        for g in range(n_a):
+            for c in range(d.shape[0]):
+                row = d[c]
+                row[:] = 0.0
+                for a in range(g, n_a):
+                    factor, column = from_nodes[g, a], recovered[rows[e, a], c]
                     for k in range(n_k):
-                        of_defect[k] += s * d_b[k] * d_c[k]
-                        of_energy[k] += s * sigma_b[k] * sigma_c[k]
+                        row[k] += factor * column[k]
+                for p in range(w.size):
+                    factor, column = from_samples[g, p], sigma[e, p, c]
+                    for k in range(n_k):
+                        row[k] -= factor * column[k]
+            add_product(d, S, det, defect[e])
+        for p in range(w.size):
+            add_product(sigma[e, p], S, w[p] * det, energy[e])

@@ -89,6 +89,31 @@ def test_a_mode_that_a_set_lacks_is_seen_though_no_residual_has_it(body, exact):
     assert errors.bound.max() < 1e-4
 
 
+def noisy_modes(exact):
+    """Forty exact modes, each with a share of its own of a higher one, so that forty corrections are independent."""
+    Phi = exact[1][:, :40] + 0.03 * exact[1][:, 50:90] * np.random.default_rng(4).uniform(0.5, 1, 40)
+    return ModeSet("noisy", Phi, tuple(map(str, range(40))), np.sqrt(exact[0][:40]) / (2 * np.pi))
+
+
+@pytest.mark.parametrize("name", ["craig-bampton", "craig-bampton-ir", "rubin", "noisy"])
+def test_sampled_corrections_give_the_estimates_of_all_corrections(monkeypatch, body, exact, name):
+    """Those of constraint modes and eigenmodes span 12 columns; if they span more, tests show it."""
+    with Families(body) as families:
+        modes = noisy_modes(exact) if name == "noisy" else MODE_SETS[name](families, n_modes=40)
+        families.fixed  # noqa: B018
+        n_solved, flexibility = [], families.flexibility
+        monkeypatch.setattr(families, "flexibility", lambda F: n_solved.append(F.shape[1]) or flexibility(F))
+        found = reduce(families, modes).errors
+        assert n_solved[:2] == [12 + 6 + 6, 2 + 6]
+        assert len(n_solved) == 2 + (name == "noisy")
+        monkeypatch.setattr(cms.reduction.error_estimates, "TESTS", 1000)
+        every = reduce(families, modes).errors
+    assert name == "rubin" or every.frequency.max() > 1e-5
+    assert_allclose(found.frequency, every.frequency, rtol=2e-3, atol=1e-9)
+    assert_allclose(found.bound, every.bound, rtol=2e-3, atol=2e-7)
+    assert_allclose(found.response, every.response, rtol=2e-3, atol=1e-6)
+
+
 def test_the_error_of_a_shape_is_that_of_its_strain_energy(body, exact):
     with Families(body) as families:
         modes = MODE_SETS["craig-bampton"](families, n_modes=9)

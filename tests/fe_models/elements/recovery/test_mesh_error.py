@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import fe_models as fm
+from fe_models.elements.recovery import mesh_error
 from fe_models.elements.recovery.mesh_error import energy_errors, free_surface, without_estimate
 from fe_models.meshes.mesh import Mesh
 from tests.bodies import beam, box_mesh, distorted
@@ -48,6 +49,28 @@ def test_a_field_whose_stress_the_mesh_represents_has_no_error(kind):
     found = energy_errors(body.element_model, u.reshape(-1, 1), everywhere(body))
     assert_allclose(found.energy.sum(), u.ravel() @ (body.K @ u.ravel()), rtol=1e-9)
     assert found.total[0] < 1e-4 * found.energy.sum()  # of the ridge of the fit
+
+
+@pytest.mark.parametrize("kind", ["tetra", "tetra10"])
+def test_nodal_defects_of_straight_tetrahedra_give_the_integral_by_quadrature(monkeypatch, kind):
+    """Some cells of second order are curved, and the columns are in two blocks."""
+    mesh = turned(box_mesh(3, 2, 2, 30.0, 20.0, 25.0, kind))
+    n_curved = 0
+    if kind == "tetra10":
+        nodes = mesh.nodes.copy()
+        nodes[mesh.cells[kind][:3, 4:]] += 0.3
+        mesh = replace(mesh, nodes=nodes)
+        n_curved = (np.isin(mesh.cells[kind], mesh.cells[kind][:3, 4:]).any(axis=1)).sum()
+    body = solid(mesh)
+    u = np.random.default_rng(2).normal(size=(3 * len(body.nodes), 5))
+    affine, others = mesh_error.affine_cells(body.element_model, kind)
+    assert len(others) == n_curved < len(affine)
+    found = energy_errors(body.element_model, u, np.arange(9))
+    monkeypatch.setattr(mesh_error, "affine_cells", lambda model, kind: (np.zeros(0, int), np.sort([*affine, *others])))
+    monkeypatch.setattr(mesh_error, "SAMPLE_BYTES", 48 * 4 * 3 * 72)
+    by_quadrature = energy_errors(body.element_model, u, np.arange(9))
+    assert_allclose(found.error, by_quadrature.error, rtol=1e-10)
+    assert_allclose(found.energy, by_quadrature.energy, rtol=1e-10)
 
 
 def test_stress_that_jumps_between_materials_is_no_error():
