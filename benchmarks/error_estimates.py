@@ -148,7 +148,7 @@ def print_cost(n: int, n_modes: int) -> None:
         mesh_errors(body, basis, 1)  # compiles
         errors = timed("estimates", lambda: error_estimates(families, modes, basis, basis.Phi, MEAN_AXES))
         n_judged, loads = len(errors.frequency), (response_loads(body), inertia_loads(families))
-        timed("reduction errors", lambda: enlarged_space(families, basis, n_judged, *loads))
+        timed("reduction errors", lambda: enlarged_space(families, basis, n_judged, *loads, has_statics=True))
         timed("mesh errors", lambda: mesh_errors(body, basis, n_judged))
     print(f"{body.n_dof} dofs, {reduced.n_q} modes, {len(errors.frequency)} of them judged")
     for name, (clock, processor) in seconds.items():

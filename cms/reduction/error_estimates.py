@@ -134,8 +134,10 @@ def error_estimates(
     n = min(max(n, 1), len(frequencies))
     mesh = mesh_errors(families.body, basis, n)
     loads, interface = interface_errors(families, basis)
+    interface = four_digits(interface, STATIC_ROUNDING)
     directions = response_loads(families.body)
-    space = enlarged_space(families, basis, n, directions, inertia_loads(families))
+    has_statics = not np.nan_to_num(interface).any()
+    space = enlarged_space(families, basis, n, directions, inertia_loads(families), has_statics=has_statics)
     errors = errors_of_modes(basis, space)
     return ErrorEstimates(
         four_digits(errors.frequency, FREQUENCY_ROUNDING),
@@ -143,7 +145,7 @@ def error_estimates(
         four_digits(errors.shape),
         four_digits(response_errors(basis, n, directions, space.motion, space.mu), RESPONSE_ROUNDING),
         loads,
-        four_digits(interface, STATIC_ROUNDING),
+        interface,
         four_digits(space.inertia, STATIC_ROUNDING),
         METHOD,
         datetime.now(UTC).date().isoformat(),
@@ -160,19 +162,24 @@ def frequency_errors(families: Families, basis: FreeBasis, n: int) -> FrequencyE
     return errors_of_modes(basis, enlarged_space(families, basis, n, none, none))
 
 
-def enlarged_space(families: Families, basis: FreeBasis, n: int, directions: Array, inertia: Array) -> EnlargedSpace:
+def enlarged_space(
+    families: Families, basis: FreeBasis, n: int, directions: Array, inertia: Array, *, has_statics: bool = False
+) -> EnlargedSpace:
     """Add the corrections of the lowest n modes and of the responses to loads, and random columns, to the set.
 
     Parameters
     ----------
     directions, inertia
         Loads of the responses, (n_dof, n_loads), and `inertia_loads`, (n_dof, n_r).
+    has_statics
+        Whether the set contains the static responses to loads at the interfaces that reactions balance. Those that
+        inertia balances then lie in the span of the set and the responses to inertia loads.
     """
-    loads = correction_loads(families, basis, n, directions)
+    loads = correction_loads(families, basis, n, directions, has_statics=has_statics)
     V, M, size = basis.Phi, loads.products.M, loads.size
     noise = M @ np.random.default_rng(SEED).standard_normal((families.body.n_dof, RANDOM))  # (3)
     sums, random = weights_of_sums(size, len(families.h)), np.random.default_rng(SEED + 2)
-    (X, smooth, _), beside, whole = parts_beside(families, loads, loads.sums(sums), noise, inertia)  # (5)
+    (X, smooth, statics), beside, whole = parts_beside(families, loads, loads.sums(sums), noise, inertia)  # (5)
     energy, T = energy_inside(loads, X)
     p = np.maximum(energy, (SMALL * size) ** 2)
     signs = random.choice([-1.0, 1.0], (len(p), TESTS if sums.shape[1] < len(p) else 0))
@@ -184,9 +191,11 @@ def enlarged_space(families: Families, basis: FreeBasis, n: int, directions: Arr
         (X,), *_ = parts_beside(families, loads, loads.sums(np.eye(len(p))))
         energy, lacking = energy_inside(loads, X)[0], 0.0
     bound = np.sqrt((energy + lacking * p)[:n] / basis.omega2[:n])  # (1)
-    X = X.beside(tests).beside(smooth).beside(smoother)
     of_inertia = slice(len(whole) - inertia.shape[1], None)
     errors = inertia_errors(beside[of_inertia], whole[of_inertia])
+    is_column = beside[of_inertia] > EXACT**2 * whole[of_inertia]
+    statics = statics[np.flatnonzero(errors[is_column] > STATIC_ROUNDING)]
+    X = X.beside(tests).beside(statics).beside(smooth).beside(smoother)
     return EnlargedSpace(bound, *ritz_shapes(basis, X, directions), X, errors)
 
 
@@ -219,13 +228,17 @@ class CorrectionLoads:
         return np.hstack([inner(X.MX, self.basis.Phi), inner(X.X, self.directions)]) @ self.C
 
 
-def correction_loads(families: Families, basis: FreeBasis, n: int, directions: Array) -> CorrectionLoads:
+def correction_loads(
+    families: Families, basis: FreeBasis, n: int, directions: Array, *, has_statics: bool
+) -> CorrectionLoads:
     """Return the loads theta M phi of the lowest n modes, and those of the responses by (4)."""
     n_V, n_loads = len(basis.omega2), directions.shape[1]
     above = np.arange(n, n_V)[basis.is_massive[n:]]
     share = np.zeros((n_V + n_loads, n_loads))
     share[above] = inner(basis.Phi[:, above], directions) / basis.omega2[above, None]
-    C = [np.eye(n_V + n_loads, n) * basis.omega2[:n], np.eye(n_V + n_loads)[:, n_V:]]
+    C = [np.eye(n_V + n_loads, n) * basis.omega2[:n]]
+    if not has_statics:
+        C.append(np.eye(n_V + n_loads)[:, n_V:])
     if len(above):
         C.append(share)
     return CorrectionLoads(basis, Products.of_body(families.body), directions, np.hstack(C))
@@ -403,7 +416,7 @@ def interface_errors(families: Families, basis: FreeBasis) -> tuple[tuple[str, .
 
 
 def inertia_loads(families: Families) -> Array:
-    """Return the loads K Psi_H, (n_dof, n_r), which hold the interfaces of the accelerating body; rotations over length.
+    """Return the loads K Psi_H that hold the interfaces of the accelerating body, rotations over length, (n_dof, n_r).
 
     The load at the held dofs balances M Psi_R in the interior: -Psi_C,Iᵀ (M Psi_R)_I.
     """

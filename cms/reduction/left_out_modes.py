@@ -27,7 +27,7 @@ from fe_models.foundation.tall.columns import dots, gram, inner, subtract
 __all__ = ["left_out_modes"]
 
 INDEPENDENT = 1e-10  #: smallest eigenvalue of the scaled Gram matrix of independent columns
-EXACT = 1e-7  #: part of a static response outside V and X, in the norm of strain energy, below which it is rounding
+EXACT = 1e-7  #: part of a static response outside V, or outside V and X, in the norm of strain energy: rounding below
 
 
 def left_out_modes(families: Families, basis: FreeBasis, X: Array, Phi: Array, frame: BodyFrame) -> LeftOutModes | None:
@@ -65,6 +65,8 @@ def left_out_modes(families: Families, basis: FreeBasis, X: Array, Phi: Array, f
     mass, Y = la.eigh(np.block([[np.diag(own), beside], [beside.T, gram(W, M_W)]]))  # (3)
     mass, Y = np.maximum(mass[::-1], 0.0), Y[:, ::-1]
     y, n_left = inner(F, W), W.shape[1]  # (4)
+    energy = (inner(F, basis.Phi) ** 2 / basis.omega2).sum(axis=1)
+    y[(y**2).sum(axis=1) <= EXACT**2 * energy] = 0.0
     spin = y[is_spin] if is_spin.any() else np.zeros((6, n_left))
     interfaces = y[loads.is_interface].reshape(-1, 6, n_left).transpose(1, 0, 2)
     return LeftOutModes(mass, Y[len(own) :], -inner(Phi, M_W), interfaces, spin, y[is_case])
