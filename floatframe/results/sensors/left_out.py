@@ -10,8 +10,8 @@ follows from
 (1) y at the outputs, in the frame of the modal file
 (2) a shape whose period has fewer than `OUTPUTS` outputs responds statically, z = Yᵀ y
 (3) the others are integrated exactly for forces that are linear between outputs: with lambda = -zeta omega + i omega_d,
-    x' = lambda x + Yᵀ y gives z = omega² / omega_d Im x. They begin at rest like the modes: undeformed if q = 0,
-    otherwise in equilibrium
+    x' = lambda x + Yᵀ y gives z = omega² / omega_d Im x. They begin at rest like the modes: undeformed if q = 0 (also
+    those of (2)), otherwise in equilibrium
 (4) zeta is that of the mode nearest in frequency
 """
 
@@ -141,14 +141,17 @@ class LeftOutShapes:
             interface_loads(self.system, trajectory, self.body),
             case_amplitudes(self.system, trajectory, self.body),
         )
-        eta = y
+        is_undeformed = not self.energies and not motion.q[0].any()
+        eta = y.copy()
         if len(self.omega):
             force = y @ self.parts
             if self.state is None:
-                before = force[0] if motion.q[0].any() else np.zeros(len(self.omega))
+                before = np.zeros(len(self.omega)) if is_undeformed else force[0]
                 self.state = at_rest(self.omega, self.zeta, float(motion.t[0]), before)
             z, self.state = oscillation(self.omega, self.zeta, motion.t, force, self.state)
-            eta = y + (z - force) @ self.parts.T
+            eta += (z - force) @ self.parts.T
+        if is_undeformed:
+            eta[0] = 0.0
         strain = motion.q**2 @ np.diag(self.body.reduced.K) / 2
         self.energies.append((motion.t, (eta**2).sum(axis=1) / 2, strain))
 

@@ -191,6 +191,15 @@ def test_outputs_too_far_apart_leave_the_static_estimate(body, reductions, whole
     assert 0.3 <= coarse.energy.max() / true.max() <= 3
 
 
+def test_a_body_that_begins_undeformed_has_left_out_nothing_at_first(reductions):
+    reduced = reductions["craig-bampton"][0]
+    coarse = integrate(free(reduced), GeneralizedAlpha(), T_END, H, output_every=20).left_out["bar"]
+    assert coarse.energy[0] == 0 < coarse.energy[1]
+    bent = free(reduced)
+    bar = replace(bent.body("bar"), q=1e-6 * np.ones(reduced.n_q))
+    assert integrate(replace(bent, bodies=(bar,)), GeneralizedAlpha(), T_END, H).left_out["bar"].energy[0] > 0
+
+
 def test_the_estimate_is_the_same_in_other_units(reductions):
     reduced = reductions["craig-bampton"][0]
     here = integrate(free(reduced), GeneralizedAlpha(), T_END, H).left_out["bar"]
