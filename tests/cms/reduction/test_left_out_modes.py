@@ -83,16 +83,18 @@ def test_loads_leave_out_the_energy_that_the_modes_lack(body, sets, name):
     assert_same_energies(forces_on(reduced.errors.left_out), lacking(body, modes, F[:, 3:]))
 
 
-def test_modal_accelerations_leave_out_the_energy_that_the_modes_lack(body, sets):
-    """Those of the free vibration modes below the cutoff, whose corrections are among the left-out shapes."""
+def test_modal_accelerations_and_loads_together_leave_out_the_energy_that_the_modes_lack(body, sets):
+    """Accelerations of the free vibration modes below the cutoff, whose corrections are among the left-out shapes."""
     modes, reduced = sets["craig-bampton"]
     with Families(body) as families:
         finished = finish(body, modes, frame_condition(body, cms.NodalFrame("left")))
         free = basis_of_finished(families, finished).Phi[:, : len(reduced.errors.frequency)]
     R = rigid_motion_of_dofs(body.nodes, body.dofs)
     q_ddot = np.linalg.lstsq(np.hstack([finished.Phi, R]), free)[0][: reduced.n_q]
-    y = q_ddot.T @ reduced.errors.left_out.inertia
-    assert_same_energies(y, lacking(body, modes, body.M @ free))
+    left_out = reduced.errors.left_out
+    _, F = loads_of_model(body, reduced.frame)
+    y = np.concatenate([forces_on(left_out), q_ddot.T @ left_out.inertia])
+    assert_same_energies(y, lacking(body, modes, np.hstack([F[:, 3:], -body.M @ free])))
 
 
 def test_vibration_shapes_have_the_frequencies_of_the_free_body_below_the_cutoff(body, sets):
