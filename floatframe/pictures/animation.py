@@ -172,8 +172,8 @@ def motion_scene(
             surfaces += drawn_surfaces
             lines += drawn_lines
         if body is not None and len(body.surface):
-            moved = displacements[name]
-            nodes = r[:, None] + (body.nodes + magnification * moved) @ R.transpose(0, 2, 1)
+            nodes = (body.nodes + magnification * displacements[name]) @ R.transpose(0, 2, 1)
+            nodes += r[:, None]
             surfaces.append(Surface(body.surface, nodes, scalars=unit_factor * scalars[name], name=name))
             for interface in body.interfaces:
                 path = interface_path(motions[name], interface, magnification)
@@ -321,14 +321,11 @@ def interface_path(motion: BodyMotion, interface: ReducedInterface, magnificatio
 
 
 def trail(path: Array, rows: IntArray) -> Lines:
-    """Return the lines that show, in each frame, the path of a point, (n_t, 3), up to the time of the frame.
-
-    All frames have the same number of points: later points of the path are placed at the point of the frame.
-    """
+    """Return the lines that show, in each frame, the path of a point, (n_t, 3), up to the time of the frame."""
     kept = np.unique(np.r_[rows, np.arange(rows[0], rows[-1], max(len(path) // TRAIL_POINTS, 1))])
-    points = path[np.minimum(kept[None, :], rows[:, None])]
     segments = np.stack([np.arange(len(kept) - 1), np.arange(1, len(kept))], axis=1)
-    return Lines(segments, points, color=TRAIL_COLOR, width=1.4, opacity=0.6)
+    last = np.searchsorted(kept, rows)
+    return Lines(segments, path[kept], color=TRAIL_COLOR, width=1.4, opacity=0.6, last=last)
 
 
 def up_of(trajectory: Trajectory, points: Array) -> Array:

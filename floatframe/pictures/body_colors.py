@@ -27,7 +27,7 @@ class BodyColor:
 def displacements(body: ReducedBody, q: Array) -> Array:
     """Return the magnitude of the elastic displacement, (n, n_kept) [m]."""
     moved = (q @ body.Phi.reshape(3 * len(body.Phi), body.n_q).T).reshape(len(q), len(body.Phi), 3)
-    return np.asarray(np.linalg.norm(moved, axis=2))
+    return np.sqrt(np.einsum("tna,tna->tn", moved, moved))
 
 
 def stresses(body: ReducedBody, q: Array) -> Array:

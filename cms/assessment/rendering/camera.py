@@ -28,6 +28,11 @@ class Camera:
         return np.asarray(self.eye + self.distance * self.axes[2])
 
     @property
+    def towards_eye(self) -> Array:
+        """Unit vectors right, up and towards the eye as rows, (3, 3)."""
+        return self.axes * np.array([[1.0], [1.0], [-1.0]])
+
+    @property
     def pixels(self) -> float:
         """Focal length in pixels [px]."""
         return float(self.size[1] / 2 / np.tan(np.deg2rad(VIEW_ANGLE) / 2))
@@ -52,22 +57,26 @@ def fitted_camera(scene: Scene, size: tuple[int, int]) -> Camera:
     right = np.cross(forward, scene.up)
     right /= np.linalg.norm(right)
     axes = np.stack([right, np.cross(right, forward), forward])
-    points = seen_points(scene) @ axes.T
-    half = FILL * np.tan(np.deg2rad(VIEW_ANGLE) / 2) * np.array([size[0] / size[1], 1.0])
-    middle = (points.min(axis=0) + points.max(axis=0)) / 2
-    for _ in range(3):
-        distance = fitting_distance(points - middle, half)
-        relative = points - middle
-        seen = relative[:, :2] / (distance + relative[:, 2:])
-        middle[:2] += (seen.min(axis=0) + seen.max(axis=0)) / 2 * distance
-    distance = fitting_distance(points - middle, half)
+    x, y, z = axes @ seen_points(scene).T
+    tan_y = FILL * np.tan(np.deg2rad(VIEW_ANGLE) / 2)
+    tan_x = tan_y * size[0] / size[1]
+    middle = np.array([(values.min() + values.max()) / 2 for values in (x, y, z)])
+    for turn in range(4):
+        distance = max(
+            fitting_distance(x - middle[0], z - middle[2], tan_x), fitting_distance(y - middle[1], z - middle[2], tan_y)
+        )
+        distance = distance if distance > 0 else 1.0  # every distance is valid for a single point
+        if turn < 3:
+            depth = z + (distance - middle[2])
+            for k, values in enumerate((x, y)):
+                seen = (values - middle[k]) / depth
+                middle[k] += (seen.min() + seen.max()) / 2 * distance
     return Camera(eye=axes.T @ middle - distance * forward, axes=axes, distance=distance, size=size)
 
 
-def fitting_distance(relative: Array, half: Array) -> float:
-    """Return the smallest distance at which points, (n, 3) in camera axes, fit between tangents ±half, (2,)."""
-    distance = float(((np.abs(relative[:, :2]) / half).max(axis=1) - relative[:, 2]).max())
-    return distance if distance > 0 else 1.0  # every distance is valid for a single point
+def fitting_distance(across: Array, depth: Array, tangent: float) -> float:
+    """Return the smallest distance at which points fit between the tangents ±`tangent` in one direction."""
+    return float((np.abs(across) / tangent - depth).max())
 
 
 def seen_points(scene: Scene) -> Array:

@@ -7,7 +7,7 @@ import numpy as np
 
 from cms.assessment.rendering.camera import Camera
 from cms.assessment.rendering.film import Image, average_of_blocks
-from cms.assessment.rendering.light import GLOSS, brightness
+from cms.assessment.rendering.light import lit
 from cms.assessment.rendering.scene import Lines, Scene, Surface, frame_of
 from cms.assessment.rendering.shape import colormap, smooth_neighbours, surface_edges, triangle_normals
 from fe_models.foundation.arrays import Array
@@ -65,7 +65,7 @@ class DrawnSurface:
         from matplotlib.colors import to_rgb
 
         self.surface = surface
-        rest = frame_of(surface.nodes, 0, 2)
+        rest = surface.nodes_at(0)
         self.smoothing = smooth_neighbours(rest, surface.triangles)
         self.edges, self.beside, self.is_sharp = surface_edges(rest, surface.triangles)
         # the inside of a closed surface is never visible
@@ -79,7 +79,7 @@ class DrawnSurface:
         A translucent surface is drawn as an outline here, because seams between translucent faces would show.
         """
         surface, triangles = self.surface, self.surface.triangles
-        nodes = frame_of(surface.nodes, frame, 2)
+        nodes = surface.nodes_at(frame)
         seen = camera.project(nodes)
         normals = triangle_normals(nodes, triangles)
         faces_eye = np.einsum("ta,ta->t", normals, camera.eye - nodes[triangles[:, 0]]) > 0
@@ -106,11 +106,8 @@ class DrawnSurface:
         """Return the colours of all triangles with lighting, (n_triangles, 4)."""
         shading = self.smoothing @ normals
         shading /= np.maximum(np.linalg.norm(shading, axis=1, keepdims=True), 1e-300)
-        shading = np.where(faces_eye[:, None], shading, -shading) @ camera.axes.T
-        shows_numbers = self.surface.scalars is not None
-        light = brightness(shading * np.array([1.0, 1.0, -1.0]), shows_numbers=shows_numbers)  # axes point forward
-        gloss = GLOSS[shows_numbers] * np.clip(shading @ unit(np.array([-0.3, 0.5, -0.85])), 0, 1) ** 24
-        rgb = np.clip(self.face_colors(frame) * light[:, None] + gloss[:, None], 0, 1)
+        shading = np.where(faces_eye[:, None], shading, -shading) @ camera.towards_eye.T
+        rgb = lit(self.face_colors(frame), shading, shows_numbers=self.surface.scalars is not None)
         return np.concatenate([rgb, np.ones((len(rgb), 1))], axis=1)
 
     def face_colors(self, frame: int) -> Array:
@@ -124,11 +121,6 @@ class DrawnSurface:
 
 def line_collection(kind: Any, lines: Lines, camera: Camera, frame: int) -> Any:
     """Return the segments of a frame as a collection, without segments that begin behind the eye."""
-    seen = camera.project(frame_of(lines.points, frame, 2))[lines.segments]
+    seen = camera.project(lines.points_at(frame))[lines.segments]
     seen = seen[(seen[..., 2] > 0).all(axis=1)]
     return kind(seen[..., :2], colors=lines.color, linewidths=OVERSAMPLING * lines.width * 0.72, alpha=lines.opacity)
-
-
-def unit(vector: Array) -> Array:
-    """Return the unit vector."""
-    return np.asarray(vector / np.linalg.norm(vector))

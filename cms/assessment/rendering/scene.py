@@ -52,6 +52,10 @@ class Surface:
         """Number of frames; 1 if static."""
         return 1 if self.nodes.ndim == 2 else len(self.nodes)
 
+    def nodes_at(self, frame: int) -> Array:
+        """Return the positions of the nodes in a frame, (n_nodes, 3)."""
+        return frame_of(self.nodes, frame, 2)
+
 
 @dataclass(frozen=True, eq=False)
 class Lines:
@@ -63,6 +67,8 @@ class Lines:
     width: float = 1.5  #: line width [px]
     opacity: float = 1.0
     is_backdrop: bool = False  #: whether the lines are drawn behind everything else, such as a ground
+    #: for a path that grows: the last point that each frame shows, (n_frames,); points are then (n_points, 3)
+    last: IntArray | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "segments", frozen(self.segments, np.int64))
@@ -72,11 +78,24 @@ class Lines:
             raise SceneError(f"lines: segments: expected (n_segments, 2), got {self.segments.shape}")
         if self.segments.size and (self.segments.min() < 0 or self.segments.max() >= n_points):
             raise SceneError(f"lines: segments: expected points 0..{n_points - 1}")
+        if self.last is not None:
+            object.__setattr__(self, "last", frozen(self.last, np.int64))
+            if self.points.ndim != 2 or self.last.ndim != 1 or self.last.min() < 0 or self.last.max() >= n_points:
+                raise SceneError(f"lines: last: expected one of {n_points} points, which do not move, for each frame")
 
     @property
     def n_frames(self) -> int:
         """Number of frames; 1 if static."""
+        if self.last is not None:
+            return len(self.last)
         return 1 if self.points.ndim == 2 else len(self.points)
+
+    def points_at(self, frame: int) -> Array:
+        """Return the points in a frame, (n_points, 3); those after the last one that it shows coincide with it."""
+        if self.last is not None:
+            last = self.last[0 if self.n_frames == 1 else frame]
+            return np.asarray(self.points[np.minimum(np.arange(len(self.points)), last)])
+        return frame_of(self.points, frame, 2)
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,10 +16,12 @@ COLOR_STOPS = ("#3b6fb6", "#4fa3c7", "#8fcfb0", "#e6e28a", "#f2a65a", "#d6513f",
 
 def triangle_normals(nodes: Array, triangles: IntArray) -> Array:
     """Return unit normals, (n_triangles, 3); zero for a triangle without area."""
-    a, b, c = (nodes[triangles[:, k]] for k in range(3))
-    normals = np.cross(b - a, c - a)
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
+    by_axis = np.ascontiguousarray(nodes.T)  # operations on columns are several times faster than np.cross on rows
+    a, b, c = (by_axis.take(triangles[:, k], axis=1) for k in range(3))
+    u, v = b - a, c - a
+    normals = np.stack([u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]])
+    length = np.sqrt((normals**2).sum(axis=0))
+    return np.divide(normals, length, out=np.zeros_like(normals), where=length > 0).T
 
 
 def surface_edges(nodes: Array, triangles: IntArray) -> tuple[IntArray, IntArray, NDArray[np.bool_]]:

@@ -192,7 +192,7 @@ def test_a_trail_shows_what_was_and_not_what_will_be():
     lines = trail(path, rows)
     for frame, row in enumerate(rows):
         kept = np.unique(np.concatenate([rows, np.arange(10, 90)]))
-        assert_array_equal(lines.points[frame], path[np.minimum(kept, row)])
+        assert_array_equal(lines.points_at(frame), path[np.minimum(kept, row)])
 
 
 def test_a_body_without_picture_is_a_cube_at_its_origin(body):

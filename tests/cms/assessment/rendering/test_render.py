@@ -17,6 +17,7 @@ from cms.assessment.rendering import (
     Surface,
     Triad,
     annotations,
+    film,
     render,
     render_animation,
     render_picture,
@@ -111,10 +112,11 @@ def covered(image, scene):
 # Backends ------------------------------------------------------------------------------------------------------------
 
 
-def test_both_backends_cover_the_same_pixels_with_nearly_the_same_colours(tmp_path):
+@pytest.mark.parametrize("shows_numbers", [True, False])
+def test_both_backends_cover_the_same_pixels_with_nearly_the_same_colours(shows_numbers, tmp_path):
     nodes, triangles = sphere()
-    scene = Scene(surfaces=(Surface(triangles, nodes, scalars=nodes[:, 2]),), size=(480, 360),
-                  direction=np.array([-1.0, 0.4, -0.3]))  # fmt: skip
+    scene = Scene(surfaces=(Surface(triangles, nodes, scalars=nodes[:, 2] if shows_numbers else None),),
+                  size=(480, 360), direction=np.array([-1.0, 0.4, -0.3]))  # fmt: skip
     one = drawn_by_pyvista(scene, tmp_path / "pyvista.png")
     draw_picture(scene, tmp_path / "matplotlib.png", matplotlib_view)
     other = read_image(tmp_path / "matplotlib.png")
@@ -235,15 +237,18 @@ def test_a_folder_that_is_not_there_is_told(tmp_path):
 # Films ---------------------------------------------------------------------------------------------------------------
 
 
-def test_a_gif_has_all_frames_its_rate_and_the_colours_of_the_frames(dying_worker, tmp_path):
+@pytest.mark.parametrize("has_ffmpeg", [True, False])
+def test_a_gif_has_all_frames_its_rate_and_the_colours_of_the_frames(has_ffmpeg, dying_worker, monkeypatch, tmp_path):
     from PIL import Image
 
+    if not has_ffmpeg:
+        monkeypatch.setattr(film, "ffmpeg_path", lambda path: "")
     seen = []
     drawing = render_animation(moving_scene(), tmp_path / "a.gif", fps=20, on_frame=lambda *n: seen.append(n))
     assert seen == [(k, 5) for k in range(1, 6)]
-    with Image.open(drawing.path) as film:
-        assert (film.n_frames, film.info["duration"], film.info["loop"]) == (5, 50, 0)
-        first = np.asarray(film.convert("RGB")).astype(int)
+    with Image.open(drawing.path) as gif:
+        assert (gif.n_frames, gif.info["duration"], gif.info["loop"]) == (5, 50, 0)
+        first = np.asarray(gif.convert("RGB")).astype(int)
     draw_picture(moving_scene(), tmp_path / "a.png", matplotlib_view)
     picture = read_image(tmp_path / "a.png").astype(int)
     assert_array_equal(first[0, 0], picture[0, 0])  # the background keeps its very colour
@@ -266,12 +271,52 @@ def test_pyvista_draws_the_frames_of_a_film(tmp_path):
     drawing = render_animation(moving_scene(3), tmp_path / "a.gif", on_frame=lambda *n: seen.append(n))
     if drawing.backend == "pyvista":
         assert seen == [(1, 3), (2, 3), (3, 3)]
-    with Image.open(drawing.path) as film:
+    with Image.open(drawing.path) as gif:
         frames = []
         for k in range(3):
-            film.seek(k)
-            frames.append(np.asarray(film.convert("RGB")).astype(int))
+            gif.seek(k)
+            frames.append(np.asarray(gif.convert("RGB")).astype(int))
     assert np.abs(frames[2] - frames[0]).mean() > 1  # it moves
+
+
+def shaded_frames(n):
+    """Frames of a shaded disc that moves before a grid."""
+    y, x = np.mgrid[:240, :320]
+    for k in range(n):
+        frame = np.full((240, 320, 3), 250, np.uint8)
+        frame[::20] = frame[:, ::20] = 210
+        across = x - 60 - 200 * k / n
+        disc = across**2 + (y - 120) ** 2 < 40**2
+        frame[disc] = (np.stack([150 + across, 100 + y, 90 + 0 * y], axis=2))[disc]
+        yield frame
+
+
+@pytest.mark.parametrize("suffix", [".gif", ".mp4"])
+def test_a_film_shows_the_motion_of_its_frames(suffix, tmp_path):
+    path, drawn = tmp_path / f"disc{suffix}", list(shaded_frames(50))
+    write_film(drawn, path, fps=25)
+    decode = [film.ffmpeg_path(path), "-loglevel", "error", "-i", path, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+    pixels = subprocess.run(decode, capture_output=True, check=True).stdout
+    shown = np.frombuffer(pixels, np.uint8).reshape(-1, 240, 320, 3).astype(int)
+    assert len(shown) == len(drawn)
+    for k in (0, 20, 49):
+        apart = [np.abs(shown[k] - other).mean() for other in drawn]
+        assert int(np.argmin(apart)) == k
+        assert apart[k] < 2
+
+
+def test_the_size_of_a_film_is_bounded(tmp_path):
+    """Noise cannot be compressed; without the limit of the rate it takes several times as much."""
+    noise = np.random.default_rng(0).integers(0, 256, (50, 240, 320, 3)).astype(np.uint8)
+    write_film(noise, tmp_path / "noise.mp4", fps=25)
+    assert (tmp_path / "noise.mp4").stat().st_size < 1.1 * (2 + 1) * film.RATE / 8  # 2 s, and a buffer of 1 s
+    write_film(shaded_frames(250), tmp_path / "disc.gif", fps=25)
+    assert (tmp_path / "disc.gif").stat().st_size < 0.5e6
+
+
+def test_a_film_that_ffmpeg_cannot_write_is_told(tmp_path):
+    with pytest.raises(RenderError, match="ffmpeg could not write the film"):
+        write_film(list(shaded_frames(2)), tmp_path / "nowhere" / "disc.mp4", fps=25)
 
 
 def test_frames_of_one_colour_make_a_film(tmp_path):
@@ -290,7 +335,8 @@ def test_average_of_blocks_keeps_the_mean():
 
 
 def test_a_scene_survives_its_file(tmp_path):
-    scene = moving_scene(4)  # with thirds, which no format holds exactly
+    path = Lines(np.array([[0, 1], [1, 2]]), CUBE, last=[0, 1, 2, 2])
+    scene = replace(moving_scene(4), lines=(*moving_scene(4).lines, path))  # with thirds, which no format holds exactly
     write_scene(scene, tmp_path / "scene.npz")
     again = read_scene(tmp_path / "scene.npz")
     for field in fields(Scene):
@@ -314,6 +360,7 @@ def test_a_scene_survives_its_file(tmp_path):
     (lambda: Surface(CUBE_TRIANGLES, CUBE, scalars=np.zeros(3)), r"scalars: expected \(8,\)"),
     (lambda: Surface(CUBE_TRIANGLES, CUBE, opacity=0.0), "0 < opacity"),
     (lambda: Lines(np.array([[0, 9]]), CUBE), "expected points 0..7"),
+    (lambda: Lines(np.array([[0, 1]]), CUBE, last=[0, 8]), "last: expected one of 8 points"),
     (lambda: Triad(np.zeros(3), np.zeros((2, 3, 3)), 1.0), "expected position"),
     (lambda: Scene(), "neither surfaces nor lines"),
     (lambda: cube_scene(up=np.array([1.0, -2.0, 1.0])), "a vector across the direction"),
