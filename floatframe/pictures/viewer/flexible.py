@@ -21,6 +21,8 @@ from floatframe.pictures.viewer.surface import ShownSurface, shown_surface
 __all__ = ["FlexibleSurface", "flexible_surface", "nodes_within"]
 
 MOVES, STRESSES = 1e-5, 1e-3  #: fractions of the largest displacement and stress below which a mode is omitted
+#: steps between the numbers of a shape and of a stress mode at their largest amplitudes, as fractions of those largest
+MOVE_STEP, STRESS_STEP = 2e-4, 1e-4
 FEWEST, MOST = 300, 20_000  #: smallest and largest number of shown nodes of a body
 CHUNK_SIZE = 2_000_000  #: largest count of displacement values in memory at a time
 
@@ -38,6 +40,15 @@ class FlexibleSurface:
     largest_displacement: float  #: largest displacement of the shown nodes in the shown rows [m]
     largest_stress: float  #: largest stress of the shown nodes in the shown rows [Pa]
     n_modes: int  #: number of modes of the body
+
+    @property
+    def steps(self) -> tuple[Array, Array]:
+        """Sufficient steps between the numbers of each shape and of each stress mode, (n_a,) each; 0 without motion."""
+        reach = np.abs(self.amplitudes).max(axis=0, initial=0.0)
+        if len(self.amplitudes) == 1:  # an equilibrium, about which modes may be drawn
+            return 0 * reach, 0 * reach
+        reach = np.maximum(reach, 1e-300)
+        return MOVE_STEP * self.largest_displacement / reach, STRESS_STEP * self.largest_stress / reach
 
 
 def nodes_within(n_bytes: float, bodies: dict[str, ReducedBody], *, with_stress: bool) -> dict[str, int]:

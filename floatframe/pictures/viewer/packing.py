@@ -40,7 +40,9 @@ class Block:
         values = np.asarray(values)
         return self.add(values, "u2" if values.max(initial=0) < 65536 else "u4")
 
-    def quantised(self, values: Array, *, each: int | None = None, centred: bool = False) -> Packed:
+    def quantised(
+        self, values: Array, *, each: int | None = None, centred: bool = False, steps: Array | None = None
+    ) -> Packed:
         """Add numbers quantised to 16 bit.
 
         Parameters
@@ -49,6 +51,9 @@ class Block:
             Axis with a separate scale for each index; None: one scale for all.
         centred
             Whether the offset is 0, so that 0 stays exactly 0.
+        steps
+            Sufficient step between numbers for each index of axis `each`. Small numbers then have small integers,
+            which compress well; None: as fine as 16 bit allow.
         """
         values = np.asarray(values, dtype=float)
         if values.size == 0:
@@ -57,7 +62,8 @@ class Block:
         low, high = values.min(axis=axes, keepdims=True), values.max(axis=axes, keepdims=True)
         offset = np.zeros_like(low) if centred else (low + high) / 2
         half = np.maximum(high - offset, offset - low)
-        scale = np.where(half > 0, half / TOP, 1.0)
+        finest = half / TOP if steps is None else np.maximum(half / TOP, np.reshape(steps, half.shape))
+        scale = np.where(half > 0, finest, 1.0)
         packed = self.add(np.rint((values - offset) / scale), "i2")
         numbers = {"scale": scale.ravel().tolist(), "offset": offset.ravel().tolist()}
         return {**packed, **numbers, "each": 0 if each is None else each % values.ndim}
