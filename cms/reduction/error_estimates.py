@@ -49,7 +49,7 @@ from cms.modes.families.receptance import boundary_scale
 from cms.modes.families.static_modes import ROUNDING_ENERGY
 from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.free_basis import FreeBasis
-from cms.reduction.left_out_modes import left_out_modes
+from cms.reduction.left_out_modes import left_out_modes, orthonormal
 from cms.reduction.mesh_error import mesh_errors
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
@@ -63,7 +63,6 @@ TESTS, MISSING = 2, 0.01  #: number of tests of (5), and the sum of relative ene
 SMALL = 1e-4  #: size of a correction relative to its mode, below which p_j in (5) is that of this size
 FREQUENCY_ROUNDING = 1e-10  #: estimated error of a frequency, below which it is rounding
 EXACT = 1e-7  #: bound b, below which a mode is exact within rounding
-INDEPENDENT = 1e-10  #: smallest eigenvalue of the scaled Gram matrix of independent corrections
 CLUSTER = 1e-3  #: relative gap of frequencies, below which shapes are judged by their common subspace
 CLUSTERED = 8  #: number of shapes beyond the judged ones that may belong to the subspace of the last of them
 NO_ENERGY = 1e-24  #: strain energy of a response relative to the largest of its kind, below which it is zero
@@ -152,7 +151,7 @@ def error_estimates(
         mesh=four_digits(mesh.frequency, FREQUENCY_ROUNDING) if mesh.sign else np.zeros(0),
         mesh_sign=mesh.sign,
         mesh_method=mesh.method,
-        left_out=left_out_modes(families, basis, space.X.X, Phi, frame),
+        left_out=left_out_modes(families, basis, space.X, Phi, frame),
     )
 
 
@@ -287,14 +286,6 @@ def energy_inside(loads: CorrectionLoads, X: DisplacementColumns) -> tuple[Array
     """Return the energy of each correction in the span of X, at least that of rounding, and T of `orthonormal`."""
     T = orthonormal(X)
     return np.maximum(((T.T @ loads.work(X)) ** 2).sum(axis=0), (EXACT * loads.size) ** 2), T
-
-
-def orthonormal(X: DisplacementColumns) -> Array:
-    """Return T for which the columns X T have unit strain energy and are K-orthogonal; dependent ones are left out."""
-    size = 1 / np.sqrt(np.maximum(dots(X.X, X.KX), np.finfo(float).tiny))
-    energies, T = la.eigh(gram(X.X, X.KX) * np.outer(size, size))
-    is_independent = energies > INDEPENDENT
-    return np.asarray(size[:, None] * T[:, is_independent] / np.sqrt(energies[is_independent]))
 
 
 def errors_of_modes(basis: FreeBasis, space: EnlargedSpace) -> FrequencyErrors:

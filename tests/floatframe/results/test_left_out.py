@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import cms
 import fe_models as fm
+import floatframe.simulation.integrate as integration
 from cms.modes.families.families import Families
 from cms.modes.mode_sets import MODE_SETS
 from cms.reduction.basis.finishing import finish
@@ -33,8 +34,14 @@ from floatframe.model.functions.time_functions import harmonic
 from floatframe.model.rotations import rotation_matrix
 from floatframe.results.sensors.left_out import LeftOutSensor, at_rest, oscillation
 from floatframe.results.validity import notes_from_json, notes_to_json
+from floatframe.simulation import resume
 from tests.bodies import beam, box_mesh, distorted, with_interfaces
 from tests.floatframe.command import run_floatframe
+
+
+class StopHereError(Exception):
+    """Interrupts a run."""
+
 
 T_END, H = 3e-3, 1e-5
 DAMPING = cms.reduction.ModalDamping(0.01)
@@ -229,6 +236,25 @@ def test_a_run_reports_what_the_modes_left_out(reductions, tmp_path):
     again = read_results(tmp_path / "bar.h5", system=system)
     assert_array_equal(again.left_out["bar"].energy, found.energy)
     assert again.head.summary["left_out"] == motion.head.summary["left_out"]
+
+
+def test_a_resumed_run_reports_what_the_whole_run_left_out(reductions, tmp_path, monkeypatch):
+    monkeypatch.setattr(integration, "SEGMENT_SECONDS", 0.0)
+    system = free(reductions["guyan"][0])
+
+    def stop(progress):
+        if progress.t > 7e-3:
+            raise StopHereError
+
+    with pytest.raises(StopHereError):
+        integrate(system, GeneralizedAlpha(), 1e-2, H, output=tmp_path / "bar.h5", progress=stop)
+    resumed = resume(system, tmp_path / "bar.h5")
+    whole = integrate(system, GeneralizedAlpha(), 1e-2, H)
+    assert whole.left_out["bar"].t_largest < 4e-3
+    assert resumed.head.summary["left_out"] == whole.head.summary["left_out"]
+    assert [note for note in resumed.validity if note.kind == "left out"] == [
+        note for note in whole.validity if note.kind == "left out"
+    ]
 
 
 def test_a_share_below_the_limit_makes_no_note(reductions):
