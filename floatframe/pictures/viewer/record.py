@@ -291,14 +291,14 @@ def body_record(
 def surface_record(block: Block, each: FlexibleSurface) -> dict[str, Any]:
     """Return a flexible surface."""
     n_a, n = each.shapes.shape[:2]
-    shapes, (fine, coarse) = each.shapes.reshape(n_a, 3 * n), each.steps
+    shapes, (step_of_shape, step_of_stress) = each.shapes.reshape(n_a, 3 * n), each.steps
     stress = None
     if each.stress is not None:
-        stress = block.quantised(each.stress.reshape(n_a, 6 * n), each=0, centred=True, steps=coarse)
+        stress = block.quantised(each.stress.reshape(n_a, 6 * n), each=0, centred=True, steps=step_of_stress)
     return {
         "body": each.body,
         "nodes": block.quantised(each.nodes, each=-1),
-        "shapes": block.quantised(shapes, each=0, centred=True, steps=fine),
+        "shapes": block.quantised(shapes, each=0, centred=True, steps=step_of_shape),
         "stress": stress,
         "corner": block.whole(each.surface.corner),
         "triangles": block.whole(each.surface.triangles),

@@ -274,17 +274,15 @@ def oscillation(omega: Array, zeta: Array, t: Array, force: Array, last: Oscilla
         State at a time before, or at the first time with the force that acted until then.
     """
     lam = rates(omega, zeta)
-    x = np.empty(force.shape, dtype=complex)
-    x_last, f_last, t_last, h = last.x, last.force, last.t, -1.0
-    E = A = B = np.zeros_like(lam)
-    for k in range(len(t)):
-        if float(t[k]) - t_last != h:
-            h = float(t[k]) - t_last
-            E, first, second = integrals(lam * h)
-            A, B = h * (first - second), h * second
-        x[k] = x_last = E * x_last + A * f_last + B * force[k]
-        f_last, t_last = force[k], float(t[k])
-    return omega / np.sqrt(1 - zeta**2) * x.imag, Oscillators(t_last, f_last, x_last)
+    steps, step_of = np.unique(np.diff(t, prepend=last.t), return_inverse=True)  # few: equal but for rounding
+    h = steps[:, None]
+    E, first, second = integrals(lam * h)
+    x = (h * (first - second))[step_of] * np.vstack([last.force, force[:-1]]) + (h * second)[step_of] * force
+    x_last, decays = last.x, list(E)
+    for x_k, k in zip(x, step_of.tolist(), strict=True):
+        x_k += decays[k] * x_last
+        x_last = x_k
+    return omega / np.sqrt(1 - zeta**2) * x.imag, Oscillators(float(t[-1]), force[-1], x_last)
 
 
 def integrals(z: Array) -> tuple[Array, Array, Array]:
