@@ -25,15 +25,23 @@ from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import ModelError, ResultsError
 from floatframe.integrators.integrator import Integrator
 from floatframe.integrators.registry import made_integrator
+from floatframe.integrators.relative import in_formulation
 from floatframe.model.state import State
 from floatframe.model.system import System
 from floatframe.results.sensors import measurement_of
-from floatframe.simulation.integrate import checked_times, integrate, number_of_steps
+from floatframe.simulation.integrate import (
+    checked_times,
+    integrate,
+    number_of_steps,
+    require_no_units,
+    require_watch,
+)
 
 __all__ = ["ManyRuns", "integrate_many"]
 
 INSTEAD = "vary it by a sweep (run_study)"
-SAME_TIME = 1e-6  #: largest difference of an output time from the time of its row, as a fraction of a step
+#: largest difference of an output time from the time of its row, as a fraction of a step, and in roundings of the time
+SAME_TIME, ROUNDINGS = 1e-6, 4
 
 
 @presented
@@ -136,13 +144,16 @@ def integrate_many(
     Raises
     ------
     ModelError
-        Before the first run, if a path, a sensor or a time is wrong, or a parameter changes the topology of the system.
+        Before the first run, if an argument is wrong, or a parameter changes the topology of the system.
     ProcessError
         If the system has a function that cannot be sent to other processes; workers = 1 computes it here.
     WorkerError
         If no workers are available.
     """
     table = values_of_table(system, parameters)
+    require_no_units(system)
+    require_watch(watch)
+    method = in_formulation(made_integrator(integrator), formulation)
     start, end, step = checked_times(t_start, t_end, h)
     if output_every < 1:
         raise ModelError(f"integrate_many: output_every: expected at least 1, got {output_every}")
@@ -154,9 +165,8 @@ def integrate_many(
     placed = as_placed(system)
     measured = {name: measurement_of(system, placed, name) for name in names}
     columns = {name: tuple(each.columns) for name, each in measured.items()}
-    method = made_integrator(integrator)
-    options = {"t_start": t_start, "state": state, "output_every": output_every, "formulation": formulation}
-    run = OneRun(system, tuple(table), names, t, (method, t_end, h), {**options, "watch": watch})
+    options = {"t_start": t_start, "state": state, "output_every": output_every, "watch": watch}
+    run = OneRun(system, tuple(table), names, t, (method, t_end, h), options)
     for path, values in table.items():
         run.require_topology(path, values)
     points = [tuple(row) for row in np.column_stack(list(table.values())).tolist()]
@@ -184,9 +194,15 @@ def values_of_table(system: System, parameters: Mapping[str, ArrayLike]) -> dict
     table = {}
     for path, values in parameters.items():
         value_at(system, path)
-        array = np.array(values, dtype=float)
+        try:
+            array = np.array(values, dtype=float)
+        except (TypeError, ValueError):
+            array = np.zeros(())
         if array.ndim != 1 or not len(array) or not np.isfinite(array).all():
-            raise ModelError(f"integrate_many: parameter {path!r}: expected a finite number for each run, (n_runs,)")
+            raise ModelError(
+                f"integrate_many: parameter {path!r}: expected a finite number for each run, (n_runs,), got "
+                f"{quoted(values)}"
+            )
         table[path] = array
     lengths = {path: len(values) for path, values in table.items()}
     if len(set(lengths.values())) > 1:
@@ -255,8 +271,8 @@ class OneRun:
     def at_output_times(self, t: Array, values: Array) -> Array:
         """Return the values at the output times, (n_t, n): of the last row at each time, NaN where there is none."""
         _, _, h = self.given
-        slack = SAME_TIME * h
-        k = np.searchsorted(t, self.t + slack) - 1
+        slack = SAME_TIME * h + ROUNDINGS * np.spacing(np.abs(self.t))
+        k = np.searchsorted(t, self.t + slack, side="right") - 1
         return np.where((np.abs(t[k] - self.t) <= slack)[:, None], values[k], np.nan)
 
     def failed(self, _: tuple[float, ...], words: str, __: bool) -> RunRow:

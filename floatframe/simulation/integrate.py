@@ -58,7 +58,9 @@ from floatframe.simulation.step_advice import frequency_words, knot_words, step_
 from floatframe.simulation.step_watch import WATCHES, StepWatch
 from floatframe.simulation.validity_watch import ValidityWatch
 
-__all__ = ["Progress", "checked_times", "integrate", "number_of_steps", "resume"]
+__all__ = [
+    "Progress", "checked_times", "integrate", "number_of_steps", "require_no_units", "require_watch", "resume",
+]  # fmt: skip
 
 log = logging.getLogger(__name__)
 
@@ -171,10 +173,7 @@ def integrate(
     ResultsError
         If the results cannot be written.
     """
-    if watch not in WATCHES:
-        raise ModelError(
-            f"integrate: watch: expected one of {', '.join(WATCHES)}, got {watch!r}{nearest(watch, WATCHES)}"
-        )
+    require_watch(watch)
     t_start, t_end, h = checked_times(t_start, t_end, h)
     integrator = in_formulation(made_integrator(integrator), formulation)
     if output_every < 1 or batch_steps < 1:
@@ -231,6 +230,14 @@ def require_no_units(system: System) -> None:
         raise ModelError(
             f"system {system.name!r} is coupled to units of other programs (fmus: {names}): use floatframe run, or "
             "floatframe.files.co_simulate in place of integrate; such a run cannot be resumed"
+        )
+
+
+def require_watch(watch: str) -> None:
+    """Raise `ModelError` unless this is a kind of checks of the steps."""
+    if watch not in WATCHES:
+        raise ModelError(
+            f"integrate: watch: expected one of {', '.join(WATCHES)}, got {watch!r}{nearest(watch, WATCHES)}"
         )
 
 

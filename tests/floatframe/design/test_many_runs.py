@@ -88,6 +88,15 @@ def test_coordinates_and_columns_are_sensors_too_and_the_state_at_the_start_is_g
     assert_array_equal(many.t, motion.t)
 
 
+@pytest.mark.parametrize("t_start", [0.1, 3e6, 1e8])
+def test_no_output_is_lost_where_times_are_coarse(t_start):
+    """At 1e8 s times are rounded to 1.5e-4 of this step."""
+    times = {"t_start": t_start, "t_end": t_start + 0.003, "h": 1e-4}
+    many = integrate_many(general_system(), {"forces.hold.stiffness": [60.0]}, METHOD, **times, workers=1)
+    motion = ff.integrate(with_value(general_system(), "forces.hold.stiffness", 60.0), METHOD, **times)
+    assert_array_equal(many.column("tip", "x")[0], motion.sensor("tip").x)
+
+
 def test_after_an_event_that_ends_a_run_its_row_has_no_numbers():
     hit = Event("hit", "speed.size", 0.65, "falling", stop=True)
     mark = Event("mark", at=0.0021, record=True)  # a row between the output times
@@ -108,8 +117,11 @@ def test_after_an_event_that_ends_a_run_its_row_has_no_numbers():
 def test_what_a_run_warns_of_is_with_its_row(caplog):
     system = general_system()
     many = integrate_many(system, {"forces.hold.stiffness": [50.0, 1e9]}, METHOD, 0.5, 1e-2, workers=1)
-    assert len(many.notes) == 2
-    assert all(any(words in record.message for record in caplog.records) for words in many.notes[0][:1])
+    calm, stiff = (" ".join(notes) for notes in many.notes)
+    assert "h = 0.01 resolves 0 of" in calm
+    assert "the error of the steps" in stiff
+    assert "the error of the steps" not in calm
+    assert all(any(words in record.message for record in caplog.records) for words in many.notes[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +151,8 @@ def test_a_number_that_changes_the_topology_is_refused_by_its_name():
         ({}, "expected at least one"),
         ({"bodies.bal.mass": [1.0]}, "there is no 'bal'; did you mean 'ball'"),
         ({"bodies.ball.mass": 1.0}, "expected a finite number for each run"),
-        ({"bodies.ball.mass": [1.0, np.nan]}, "expected a finite number for each run"),
+        ({"bodies.ball.mass": [1.0, np.nan]}, r"number for each run, \(n_runs,\), got \[1\.0, nan\]"),
+        ({"bodies.ball.mass": ["heavy"]}, "expected a finite number for each run"),
         ({"bodies.ball.mass": [1.0], "gravity.1": [1.0, 2.0]}, r"got bodies\.ball\.mass 1, gravity\.1 2"),
     ],
 )
@@ -160,6 +173,19 @@ def test_a_function_that_no_other_process_can_find_is_told_and_runs_here():
     with pytest.raises(ProcessError, match="system 'swing' cannot be sent to other processes"):
         integrate_many(system, *given, sensors=["pin.angle"], workers=2)
     assert integrate_many(system, *given, sensors=["pin.angle"], workers=1).n_failed == 0
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"watch": "of"}, "watch: expected one of stop, tell, off, got 'of'; did you mean 'off'"),
+        ({"formulation": "realtive"}, "formulation: expected one of absolute, relative, got 'realtive'"),
+        ({"output_every": 0}, "output_every: expected at least 1, got 0"),
+    ],
+)
+def test_wrong_options_are_refused_before_the_first_run(options, words):
+    with pytest.raises(ModelError, match=words):
+        integrate_many(general_system(), {"bodies.ball.mass": [1.0]}, METHOD, **{**TIMES, **options}, workers=1)
 
 
 def test_wrong_sensors_and_times_are_refused_before_the_first_run():
