@@ -98,13 +98,16 @@ def file_digest(path: str | Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def file_state(path: str | Path) -> tuple[int, int, int] | None:
-    """Return size, time of the last change and number of a file, which tell a changed file; None: there is none."""
+def file_state(path: str | Path) -> tuple[int, ...] | None:
+    """Return numbers that differ after a file has changed: size, times of the changes, inode; None: there is no file.
+
+    A program can set the time of a change of content, as `cp -p` does, but not that of a change of the inode.
+    """
     try:
         found = os.stat(path)
     except OSError:
         return None
-    return found.st_size, found.st_mtime_ns, found.st_ino
+    return found.st_size, found.st_mtime_ns, found.st_ctime_ns, found.st_ino
 
 
 def own_descriptor(path: Path) -> int | None:

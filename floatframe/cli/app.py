@@ -210,6 +210,7 @@ def load_kernels(clock: "Stages") -> None:
 def print_run(trajectory: "Trajectory") -> None:
     """Print a summary of a motion, its cost and its accuracy."""
     from floatframe.results.export import run_record
+    from floatframe.results.sensors.left_out import share_words
 
     record = run_record(trajectory, spectra.known_system(trajectory))
     units = trajectory.units
@@ -239,8 +240,8 @@ def print_run(trajectory: "Trajectory") -> None:
         done += [f"impulse {value:.6g} at {name}" for name, value in event.get("impulse", {}).items()]
         rows.append(("event", f"{event['name']} at {event['t']:.9g} {second}: {', '.join(done) or 'recorded'}"))
     for name, largest in summary.get("left_out", {}).items():
-        at_most = f"at most {100 * largest['share']:.2g} % of its strain energy"
-        rows.append(("left out by modes", f"body {name!r}: {at_most}, at t = {largest['t']:.6g}"))
+        words = share_words(largest["share"], largest["t"])
+        rows.append(("left out by modes", f"body {name!r}: {words} {second}"))
     if "wall_time" in summary:
         rows.append(("wall time", f"{summary['wall_time']:.2f} s"))
     rows.append(("energy defect", f"{record['energy_defect']:.2e} of {record['energy_scale']:.6g} {energy}"))

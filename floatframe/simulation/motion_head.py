@@ -82,7 +82,7 @@ def digest_of(source: str) -> str:
 
 
 @lru_cache(maxsize=64)  # many runs have bodies of the same files
-def digest_of_state(source: str, _: tuple[int, int, int] | None) -> str:
+def digest_of_state(source: str, _: tuple[int, ...] | None) -> str:
     """Return the digest of a modal file in a state, see `file_state`."""
     from cms.body.modal_file.file import digest
 

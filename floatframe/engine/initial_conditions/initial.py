@@ -383,9 +383,9 @@ def solve_accelerations(
             break
     else:
         log.warning(
-            "the accelerations at the start were not found in %d iterations: friction or a user's force changes the "
-            "reactions on which it depends by more than these, so rigid bodies may have no motion, or several; take a "
-            "smaller coefficient of friction, or a bushing in place of the joint",
+            "the accelerations at the start were not found in %d iterations, because friction or a user force depends "
+            "too strongly on the reactions: the motion of rigid bodies may not exist, or not be unique; use a smaller "
+            "coefficient of friction, or a bushing in place of the joint",
             MOST_ITERATIONS,
         )
     return in_ground_axes(model, state, y), w

@@ -124,7 +124,7 @@ class BodySection(Table):
 
 
 #: state and body of each modal file, which a task that reads many systems keeps from one to the next
-ReadBodies = dict[Path, tuple[tuple[int, int, int] | None, ReducedBody]]
+ReadBodies = dict[Path, tuple[tuple[int, ...] | None, ReducedBody]]
 
 
 def body_of(
@@ -180,9 +180,10 @@ def reduced_of(name: str, section: BodySection, read_bodies: ReadBodies | None) 
         if read_bodies is None:
             return read(section.file)
         state = file_state(section.file)
-        if section.file not in read_bodies or read_bodies[section.file][0] != state:
-            read_bodies[section.file] = (state, read(section.file))
-        return read_bodies[section.file][1]
+        known = read_bodies.get(section.file)
+        if known is None or known[0] != state:
+            known = read_bodies[section.file] = (state, read(section.file))
+        return known[1]
     family = family_of(section.file, file_digest(section.file))
     try:
         return family.at(**section.at)

@@ -39,7 +39,7 @@ from floatframe.results.small_motions.rows import LinearColumns
 from floatframe.results.small_motions.small_motions import SmallMotions
 from floatframe.results.trajectory import Trajectory
 
-__all__ = ["LeftOutEnergy", "LeftOutSensor", "LeftOutShapes", "left_out", "left_out_shapes"]
+__all__ = ["LeftOutEnergy", "LeftOutSensor", "LeftOutShapes", "left_out", "left_out_shapes", "share_words"]
 
 OUTPUTS = 10  #: smallest number of outputs in a period of a shape that is integrated over time
 MOST_DAMPED = 0.999  #: largest damping ratio of (3)
@@ -104,7 +104,12 @@ class LeftOutEnergy:
     @property
     def description(self) -> str:
         """Return the largest share as text."""
-        return f"at most {100 * self.share:.2g} % of its strain energy, at t = {self.t_largest:.6g}"
+        return share_words(self.share, self.t_largest)
+
+
+def share_words(share: float, t: float) -> str:
+    """Return the estimated largest share of the strain energy, and its time without unit."""
+    return f"up to about {100 * share:.2g} % of its strain energy, at t = {t:.6g}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,10 +3,11 @@ import stat
 import subprocess
 import sys
 import threading
+import time
 
 import pytest
 
-from fe_models.foundation.paths import is_stream, replace_file, same_file
+from fe_models.foundation.paths import file_state, is_stream, replace_file, same_file
 from tests.root import ROOT
 
 
@@ -57,3 +58,16 @@ def test_files_and_folders_are_no_streams_and_links_are_the_same_file(tmp_path):
     assert same_file(tmp_path / "a", tmp_path / "b")
     assert same_file(tmp_path / "c", tmp_path / "d")
     assert not same_file(tmp_path / "a", tmp_path / "d")
+
+
+def test_a_changed_file_of_the_same_size_and_time_is_noticed(tmp_path):
+    path = tmp_path / "body.h5"
+    assert file_state(path) is None
+    path.write_bytes(b"one")
+    before, found = file_state(path), path.stat()
+    assert file_state(path) == before
+    time.sleep(0.02)  # times of files are rounded to some milliseconds
+    path.write_bytes(b"two")
+    os.utime(path, ns=(found.st_atime_ns, found.st_mtime_ns))
+    assert path.stat().st_mtime_ns == found.st_mtime_ns
+    assert file_state(path) != before
