@@ -10,7 +10,7 @@ from floatframe.engine.kernels.connections.element_law import law_power
 from floatframe.engine.kernels.connections.pair_force import is_pair, pair_power
 from floatframe.engine.kernels.connections.user_force import user_force_power
 from floatframe.engine.kernels.joints.coordinate_force import coordinate_force, coordinate_power, coordinate_strain
-from floatframe.engine.kernels.joints.loaded_rows import normal_force
+from floatframe.engine.kernels.joints.loaded_rows import normal_part
 from floatframe.engine.kernels.joints.relative_motion import loaded_axis, loaded_coordinate
 from floatframe.engine.kernels.memory import (
     ANGULAR_MOMENTUM,
@@ -136,7 +136,7 @@ def loaded_power(model, work, c):
         if rows.is_loaded[k]:
             is_angle = rows.is_angle[k] != 0
             x, v = loaded_coordinate(rows, markers, k, a, b)
-            normal, _ = normal_force(w, loaded_axis(rows, markers, k, a, b))
+            normal, _ = normal_part(w, loaded_axis(rows, markers, k, a, b))
             Q, _, _, _ = coordinate_force(model, work, k, is_angle, x, v, normal)
             given, taken = coordinate_power(model, work, k, is_angle, x, v, Q)
             loads += given

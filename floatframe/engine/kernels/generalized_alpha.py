@@ -76,7 +76,9 @@ __all__ = [
     "load_memory",
     "load_state",
     "mean_square",
+    "newton_weights",
     "next_acceleration",
+    "next_of_unknown",
     "ratio_of_steps",
     "shares",
     "takes_spin",
@@ -484,12 +486,12 @@ def local_error(model, work, memory, order, h):
         u0, n = model.bodies.u0[i], model.bodies.n_q[i]
         jump = work.bodies.velocity[: 6 + n]
         for k in range(6 + n):
-            mean = (1 - alpha_f) * work.state.u_dot[u0 + k] + alpha_f * memory.u_dot[u0 + k]
-            jump[k] = (mean - alpha_m * memory.a[u0 + k]) / (1 - alpha_m) - memory.a[u0 + k]
+            a = memory.a[u0 + k]
+            jump[k] = next_of_unknown(a, memory.u_dot[u0 + k], work.state.u_dot[u0 + k], alpha_m, alpha_f) - a
         if work.state.spins[i] != 0:
             e = spin_axis(model, i)
-            a, turning = angular_accelerations(model, work, memory, i, alpha_m, alpha_f)
-            put(jump, 3, turned_about(e, -dot(e, vector(work.state.theta[i])), sub(turning, a)))
+            begin, turning = angular_accelerations(model, work, memory, i, alpha_m, alpha_f)
+            put(jump, 3, turned_about(e, -dot(e, vector(work.state.theta[i])), sub(turning, begin)))
         largest = max(largest, mean_square(model, work, i, jump))
     return error_factor(order, h) * math.sqrt(largest)
 
@@ -517,16 +519,19 @@ def mean_square(model, work, i, jump):
 
 
 @inner
+def newton_weights(order, h):
+    """Return the derivatives of acceleration, velocity and displacement by a correction divided by c_k."""
+    return (1 - order.alpha_m) / (1 - order.alpha_f), order.gamma * h, order.beta * h * h
+
+
+@inner
 def one_step(model, work, memory, order, h):
     """Advance the memory by one step, unless the estimated error is larger than allowed.
 
     Return (status, index of the singular body or connection, last correction divided by the allowed one, error or -1 if
     it is not estimated).
     """
-    alpha_m, alpha_f, beta, gamma = order.alpha_m, order.alpha_f, order.beta, order.gamma
-    c_k = beta * h * h
-    c_d = gamma * h
-    c_m = (1 - alpha_m) / (1 - alpha_f)
+    c_m, c_d, c_k = newton_weights(order, h)
     size, size_x = predict(model, work, memory, h, order)
     wanted = wanted_correction(model, order, c_k, size, size_x)
     allowed = wanted + roundoff_floor(model, work.state.r, order.length)
@@ -615,7 +620,7 @@ def one_step(model, work, memory, order, h):
                 error = local_error(model, work, memory, order, h)
                 if not error <= order.most_error:
                     return INACCURATE, -1, excess, error
-            accept(model, work, memory, h, alpha_m, alpha_f)
+            accept(model, work, memory, order, h)
             return DONE, -1, excess, error
         if norm > SLOW * last and not is_small:
             work.solver.is_due = 1
@@ -635,14 +640,14 @@ def is_too_long(model, work, h):
 
 
 @inner
-def accept(model, work, memory, h, alpha_m, alpha_f):
+def accept(model, work, memory, order, h):
     """(3): write the iterate and the new algorithmic acceleration into the memory."""
+    alpha_m, alpha_f = order.alpha_m, order.alpha_f
     for i in range(model.bodies.kind.shape[0]):
         u0 = model.bodies.u0[i]
         _, turning = angular_accelerations(model, work, memory, i, alpha_m, alpha_f)
         for k in range(u0, u0 + 6 + model.bodies.n_q[i]):
-            mean = (1 - alpha_f) * work.state.u_dot[k] + alpha_f * memory.u_dot[k]
-            memory.a[k] = (mean - alpha_m * memory.a[k]) / (1 - alpha_m)
+            memory.a[k] = next_of_unknown(memory.a[k], memory.u_dot[k], work.state.u_dot[k], alpha_m, alpha_f)
         p, theta = memory.p[i], vector(work.state.theta[i])
         if work.state.spins[i] != 0:
             e = spin_axis(model, i)
@@ -666,6 +671,12 @@ def angular_accelerations(model, work, memory, i, alpha_m, alpha_f):
         a, before = sub(a, turn), sub(before, turn)
         now = turned_about(e, along, sub(now, turn_of_axis(e, vector(work.state.u[u0:]))))
     return a, next_acceleration(a, before, now, alpha_m, alpha_f)
+
+
+@small
+def next_of_unknown(a, before, now, alpha_m, alpha_f):
+    """Return the algorithmic acceleration of an unknown after a step by (3)."""
+    return ((1 - alpha_f) * now + alpha_f * before - alpha_m * a) / (1 - alpha_m)
 
 
 @inner

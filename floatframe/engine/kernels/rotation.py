@@ -8,7 +8,7 @@ less than 1e-17.
 import math
 
 from floatframe.engine.kernels.compiler.compilation import inner
-from floatframe.engine.kernels.vector import add, cross, dot, product, scaled, sub, turned, unit
+from floatframe.engine.kernels.vector import add, axial, cross, dot, product, scaled, sub, turned, unit
 
 __all__ = [
     "after_spin",
@@ -218,7 +218,7 @@ def matrix_of_euler_parameters(p):
 def quaternion_of(R):
     """Return scalar and vector of a quaternion of any length for a rotation matrix; the scalar is not negative."""
     w = 1.0 + R[0][0] + R[1][1] + R[2][2]  # 4 w², and 4 w times x
-    x = (R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1])
+    x = axial(R)
     if w < 1.0:  # more than 120 degrees: the products of x, y, z with the largest of them, times 4
         k = 0 if R[0][0] >= R[1][1] and R[0][0] >= R[2][2] else (1 if R[1][1] >= R[2][2] else 2)
         symmetric = (

@@ -112,6 +112,12 @@ def tilde(x):
 
 
 @small
+def axial(W):
+    """Return (W_zy - W_yz, W_xz - W_zx, W_yx - W_xy), twice the axial vector of W."""
+    return W[2][1] - W[1][2], W[0][2] - W[2][0], W[1][0] - W[0][1]
+
+
+@small
 def matrix_sum(A, B):
     """Return A + B."""
     return add(A[0], B[0]), add(A[1], B[1]), add(A[2], B[2])

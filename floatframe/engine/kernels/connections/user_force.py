@@ -11,7 +11,7 @@ Described in `floatframe.model.forces.user_force`.
 
 import math
 
-from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.compiler.compilation import inner, view
 from floatframe.engine.kernels.compiler.user_call import call_user_function
 from floatframe.engine.kernels.connections.coordinate import (
     clear_derivatives,
@@ -20,6 +20,7 @@ from floatframe.engine.kernels.connections.coordinate import (
     coordinate_motion,
     coordinate_rows,
 )
+from floatframe.engine.kernels.dense import part_of
 from floatframe.engine.kernels.time_function import time_function
 from floatframe.model.functions.expressions import (
     ABS,
@@ -53,6 +54,7 @@ from floatframe.model.functions.expressions import (
 __all__ = [
     "begin_states",
     "element_of",
+    "input_parts",
     "note_no_number",
     "put_state_derivatives",
     "resize_states",
@@ -215,37 +217,39 @@ def element_of(model, c):
 
 
 @inner
-def gather_inputs(model, work, c):
-    """Write t, x, v, z into work.users.inputs; return the numbers of coordinates and of inputs."""
+def counts_of(model, c):
+    """Return the numbers of coordinates, inputs and outputs of user force c."""
     i, u = element_of(model, c), model.connections.item[c]
-    first, last = model.elements.coordinate0[i], model.elements.coordinate0[i + 1]
-    n = last - first
-    work.users.inputs[0] = work.state.time
-    for p in range(first, last):
-        x, v = coordinate_motion(model, work, p)
-        work.users.inputs[1 + p - first] = x
-        work.users.inputs[1 + n + p - first] = v
-    row = model.elements.core[i] + model.users.n_forces[u]
-    for s in range(model.users.n_states[u]):
-        work.users.inputs[1 + 2 * n + s] = work.state.w[row + 3 * s]
-    return n, 1 + 2 * n + model.users.n_states[u]
+    n, n_states = model.elements.coordinate0[i + 1] - model.elements.coordinate0[i], model.users.n_states[u]
+    return n, 1 + 2 * n + n_states, model.users.n_forces[u] + n_states
+
+
+@view
+def input_parts(inputs, n):
+    """Return the parts x, v (n each) and z of the inputs t, x, v, z of a user force, or of a row of derivatives."""
+    return inputs[1 : 1 + n], inputs[1 + n : 1 + 2 * n], inputs[1 + 2 * n :]
 
 
 @inner
 def user_values(model, work, c):
-    """Write forces and rates of states into work.users.outputs.
-
-    Return the numbers of coordinates, inputs and outputs.
-    """
-    n, n_in = gather_inputs(model, work, c)
-    return n, n_in, user_outputs(model, work, c, n_in)
+    """Write t, x, v, z into work.users.inputs, and forces and rates of states into work.users.outputs."""
+    i, u = element_of(model, c), model.connections.item[c]
+    first, last = model.elements.coordinate0[i], model.elements.coordinate0[i + 1]
+    work.users.inputs[0] = work.state.time
+    x, v, z = input_parts(work.users.inputs, last - first)
+    for p in range(first, last):
+        x[p - first], v[p - first] = coordinate_motion(model, work, p)
+    row = model.elements.core[i] + model.users.n_forces[u]
+    for s in range(model.users.n_states[u]):
+        z[s] = work.state.w[row + 3 * s]
+    user_outputs(model, work, c)
 
 
 @inner
-def user_outputs(model, work, c, n_in):
-    """Write forces and rates of states for the n_in inputs into work.users.outputs; return their number."""
+def user_outputs(model, work, c):
+    """Write forces and rates of states for the inputs into work.users.outputs."""
     u = model.connections.item[c]
-    n_out = model.users.n_forces[u] + model.users.n_states[u]
+    _, n_in, n_out = counts_of(model, c)
     if model.users.address[u] != 0:
         call_user_function(model.users.address[u], work.users.inputs, work.users.outputs)
     else:
@@ -253,7 +257,6 @@ def user_outputs(model, work, c, n_in):
             f = model.users.tape0[u] + j
             work.users.outputs[j] = tape_value(model.tapes, model.functions, f, work.users.inputs, work.tapes)
     note_no_number(work, c, work.users.outputs, n_out, work.users.inputs, n_in)
-    return n_out
 
 
 @inner
@@ -274,14 +277,15 @@ def are_finite(values, n):
 
 @inner
 def user_gradients(model, work, c):
-    """Write the derivatives of all outputs by all inputs, row by row; return the numbers of coordinates and inputs."""
+    """Write the derivatives of all outputs by all inputs, row by row."""
     u = model.connections.item[c]
-    n, n_in, n_out = user_values(model, work, c)
+    n, n_in, n_out = counts_of(model, c)
+    user_values(model, work, c)
     if model.users.address[u] == 0:
         for j in range(n_out):
-            f, gradient = model.users.tape0[u] + j, work.users.gradients[j * n_in : (j + 1) * n_in]
+            f, gradient = model.users.tape0[u] + j, part_of(work.users.gradients, n_in, j, 1)
             tape_gradient(model.tapes, model.functions, f, work.users.inputs, work.tapes, gradient)
-        return n, n_in, n_out
+        return
     first = model.elements.coordinate0[element_of(model, c)]
     for k in range(1, n_in):  # derivatives by time are not used
         here = work.users.inputs[k]
@@ -303,7 +307,6 @@ def user_gradients(model, work, c):
         for j in range(n_out):
             change = work.users.gradients[j * n_in + k] - work.users.trial[j]
             work.users.gradients[j * n_in + k] = change / (above - below)
-    return n, n_in, n_out
 
 
 @inner
@@ -347,7 +350,8 @@ def user_force_derivatives(model, work, c, c_k):
     for p in range(first, last):
         k = model.coordinates.core[p]
         coordinate_derivatives(model, work, c, p, work.state.w[k], k, 1.0, c_k)
-    n, n_in, n_out = user_gradients(model, work, c)
+    user_gradients(model, work, c)
+    n, n_in, n_out = counts_of(model, c)
     n_forces, n_states = model.users.n_forces[u], model.users.n_states[u]
     core = model.elements.core[i] - model.connections.w0[c]
     for s in range(n_states):
@@ -355,11 +359,11 @@ def user_force_derivatives(model, work, c, c_k):
     for j in range(n_out):
         r = core + j if j < n_forces else core + n_forces + 3 * (j - n_forces) + 1
         V[r, r] = 1.0
-        slopes = work.users.gradients[j * n_in : (j + 1) * n_in]
+        by_x, by_v, by_z = input_parts(part_of(work.users.gradients, n_in, j, 1), n)
         for p in range(first, last):
-            coordinate_gradient(model, work, p, r, -c_k * slopes[1 + p - first], -c_k * slopes[1 + n + p - first])
+            coordinate_gradient(model, work, p, r, -c_k * by_x[p - first], -c_k * by_v[p - first])
         for s in range(n_states):
-            V[r, core + n_forces + 3 * s] -= slopes[1 + 2 * n + s]
+            V[r, core + n_forces + 3 * s] -= by_z[s]
 
 
 @inner

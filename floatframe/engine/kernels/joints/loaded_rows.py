@@ -16,11 +16,11 @@ from floatframe.engine.kernels.joints.relative_motion import add_coordinate_grad
 from floatframe.engine.kernels.vector import cross, dot, put, put_sum, scaled, sub, vector
 from floatframe.model.joints.rows.kinds import PUSH, TWIST_B
 
-__all__ = ["loaded_derivatives", "loaded_value", "normal_force"]
+__all__ = ["loaded_derivatives", "loaded_value", "normal_part"]
 
 
 @inner
-def normal_force(w, e):
+def normal_part(w, e):
     """Return the absolute value of the force normal to the axis, and the force component along the axis."""
     F = vector(w)
     along = dot(e, F)
@@ -33,7 +33,7 @@ def loaded_value(model, work, k, a, b, w):
     rows, markers = model.rows, work.markers
     e = loaded_axis(rows, markers, k, a, b)
     x, v = loaded_coordinate(rows, markers, k, a, b)
-    normal, _ = normal_force(w, e)
+    normal, _ = normal_part(w, e)
     Q, _, _, _ = coordinate_force(model, work, k, rows.kind[k] != PUSH, x, v, normal)
     return dot(e, vector(w[rows.part[k] :])) + Q
 
@@ -45,7 +45,7 @@ def loaded_derivatives(model, work, k, a, b, w, c_k, by, V):
     part, is_angle = rows.part[k], rows.kind[k] != PUSH
     e = loaded_axis(rows, markers, k, a, b)
     x, v = loaded_coordinate(rows, markers, k, a, b)
-    normal, along = normal_force(w, e)
+    normal, along = normal_part(w, e)
     _, Q_x, Q_v, Q_n = coordinate_force(model, work, k, is_angle, x, v, normal)
     put(V, part, e)
     turn = cross(e, vector(w[part:]))  # derivative by a rotation of the marker with the axis

@@ -19,15 +19,12 @@ from floatframe.engine.structure_preserving.kernels.markers import (
     add_moment,
     add_pair,
     begin_unit_load,
+    distances,
     end_unit_load,
+    mean_direction,
     turning,
 )
-from floatframe.engine.structure_preserving.kernels.rows import (
-    add_slide,
-    angle_loads,
-    angle_of,
-    mean_direction,
-)
+from floatframe.engine.structure_preserving.kernels.rows import add_slide, angle_loads, angle_of
 from floatframe.model.joints.rows.kinds import PUSH, SPAN, TWIST_B
 
 __all__ = ["add_coordinate_force", "add_impulsive_force", "coordinate_at", "coordinate_change", "coordinate_ends",
@@ -37,7 +34,7 @@ __all__ = ["add_coordinate_force", "add_impulsive_force", "coordinate_at", "coor
 @inner
 def span(step, a, b):
     """Return the mean distance of two points over the force interval, and its derivative by the mean r_B - r_A."""
-    d_0, d_1 = sub(vector(step.x_0[b]), vector(step.x_0[a])), sub(vector(step.x_f[b]), vector(step.x_f[a]))
+    d_0, d_1 = distances(step, a, b)
     mean = 0.5 * (norm(d_0) + norm(d_1))
     return mean, scaled(0.5 / mean, add(d_0, d_1))
 

@@ -64,11 +64,12 @@ from floatframe.engine.kernels.vector import (
 from floatframe.engine.structure_preserving.kernels.markers import (
     add_pair,
     deformation,
+    mean_direction,
     mean_jacobian,
     put_end_of_forces,
     put_start,
 )
-from floatframe.engine.structure_preserving.kernels.rows import add_product, held, mean_direction
+from floatframe.engine.structure_preserving.kernels.rows import add_product, held
 from floatframe.model.joints.rows.kinds import LINE_TURN
 
 __all__ = ["add_line_reaction", "begin_lines", "line_rate", "line_steps", "line_value"]

@@ -17,14 +17,9 @@ from floatframe.engine.structure_preserving.kernels.markers import (
     begin_unit_load,
     end_unit_load,
     ends,
-)
-from floatframe.engine.structure_preserving.kernels.rows import (
-    add_product,
-    add_slide,
-    held,
     mean_direction,
-    mean_distance,
 )
+from floatframe.engine.structure_preserving.kernels.rows import add_product, add_slide, held, mean_distance
 from floatframe.model.joints.rows.kinds import COUPLE, LINE, LINE_TURN, RIM_HEIGHT, ROLL
 
 __all__ = ["add_reaction", "row_change", "row_rate", "row_value"]

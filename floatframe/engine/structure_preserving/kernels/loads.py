@@ -9,7 +9,9 @@ import math
 
 from floatframe.engine.kernels.body import column
 from floatframe.engine.kernels.compiler.compilation import inner, loops
+from floatframe.engine.kernels.dense import part_of
 from floatframe.engine.kernels.joints.coordinate_force import excess, given_force
+from floatframe.engine.kernels.joints.loaded_rows import normal_part
 from floatframe.engine.kernels.time_function import time_function
 from floatframe.engine.kernels.vector import (
     add,
@@ -32,7 +34,13 @@ from floatframe.engine.structure_preserving.kernels.coordinates import (
     coordinate_rate,
     span,
 )
-from floatframe.engine.structure_preserving.kernels.markers import add_force, add_moment, add_pair, ends, turning
+from floatframe.engine.structure_preserving.kernels.markers import (
+    add_force,
+    add_moment,
+    add_pair,
+    mean_direction,
+    turning,
+)
 from floatframe.engine.structure_preserving.kernels.rows import force_of_row, mean_distance
 from floatframe.model.joints.rows.kinds import PUSH
 
@@ -67,9 +75,7 @@ def point_load(model, step, k):
         factor, _, _ = time_function(model.functions, model.loads.factor[k], step.t_force)
     F, T = scaled(factor, vector(model.loads.force[k])), scaled(factor, vector(model.loads.torque[k]))
     if model.markers.is_follower[m]:
-        F_0, F_1 = ends(step, m, F)
-        T_0, T_1 = ends(step, m, T)
-        F, T = scaled(0.5, add(F_0, F_1)), scaled(0.5, add(T_0, T_1))
+        F, T = mean_direction(step, m, F), mean_direction(step, m, T)
     add_force(step, m, F)
     add_moment(model, step, m, T)
     work = dot(F, vector(step.dx[m])) + dot(T, turning(model, step, m))
@@ -82,7 +88,7 @@ def body_load(model, discrete, step, k):
     i, first = model.body_loads.body[k], model.body_loads.value0[k]
     n, u0, q0 = model.bodies.n_q[i], model.bodies.u0[i], model.bodies.q0[i]
     factor, _, _ = time_function(model.functions, model.body_loads.factor[k], step.t_force)
-    values, C = model.body_loads.values[first : first + 6 + n], step.C_mean[3 * q0 : 3 * q0 + 3 * n]
+    values, C = model.body_loads.values[first : first + 6 + n], part_of(step.C_mean, 3, q0, n)
     f, tau, s = scaled(factor, vector(values)), scaled(factor, vector(values[3:])), vector(step.s_mean[i])
     far = matrix(step.R_0[i]) if step.is_still else matrix(step.R_1[i])
     R = scaled_matrix(0.5, matrix_sum(matrix(step.R_0[i]), far))
@@ -108,9 +114,8 @@ def normal_force(model, discrete, step, c, k):
             F = add(F, scaled(step.f[j], force_of_row(model, step, row, a, b)))
     x = vector(model.rows.x[k])
     axis = x if model.rows.kind[k] == PUSH else cross(x, vector(model.rows.z[k]))
-    E_0, E_1 = ends(step, a, axis)
-    along = dot(F, scaled(0.5, add(E_0, E_1)))
-    return math.sqrt(max(dot(F, F) - along * along, 0.0))
+    normal, _ = normal_part(F, mean_direction(step, a, axis))
+    return normal
 
 
 @inner

@@ -25,6 +25,7 @@ import math
 
 from floatframe.engine.kernels.body import column_sum
 from floatframe.engine.kernels.compiler.compilation import inner, loops, small
+from floatframe.engine.kernels.dense import part_of
 from floatframe.engine.kernels.marker import bent_shapes, shape, shape_sum
 from floatframe.engine.kernels.rotation import exp_matrix, left_jacobian
 from floatframe.engine.kernels.vector import (
@@ -47,8 +48,8 @@ from floatframe.engine.kernels.vector import (
 )
 
 __all__ = ["add_direction", "add_force", "add_moment", "add_pair", "begin_markers", "begin_unit_load", "change",
-           "end_unit_load", "ends", "marker_loads", "marker_step", "put_end_of_forces", "put_start",
-           "turning"]  # fmt: skip
+           "distances", "end_unit_load", "ends", "marker_loads", "marker_step", "mean_direction", "put_end_of_forces",
+           "put_start", "turning"]  # fmt: skip
 
 SMALL = 1e-14  # square of an elastic rotation in a step below which its Cayley vector is T dth to roundoff
 NONE = (0.0, 0.0, 0.0)
@@ -132,7 +133,7 @@ def marker_step(model, discrete, step, m):
     dx = add(vector(step.d[i]), cross(vector(step.theta_G[i]), lever))
     put_matrix(step.E_mean[m], scaled_matrix(0.5, matrix_sum(E_0, E_1)))
     if n:
-        o, C, dq = model.markers.psi0[m], step.C_mean[3 * q0 : 3 * q0 + 3 * n], step.dq[q0 : q0 + n]
+        o, C, dq = model.markers.psi0[m], part_of(step.C_mean, 3, q0, n), step.dq[q0 : q0 + n]
         psi = step.psi[6 * discrete.psi0[m] :]
         if o >= 0:
             bent_shapes(model, m, n, step.q_mean[q0 : q0 + n], 1.0, psi)
@@ -194,6 +195,19 @@ def half_turn(th):
 def ends(step, m, e):
     """Return direction e of a marker at both ends of the force interval."""
     return turned(step.A_0[m], e), turned(step.A_f[m], e)
+
+
+@inner
+def mean_direction(step, m, e):
+    """Return the mean of a marker's direction e over the step."""
+    E_0, E_1 = ends(step, m, e)
+    return scaled(0.5, add(E_0, E_1))
+
+
+@inner
+def distances(step, a, b):
+    """Return the vector from A to B at both ends of the force interval."""
+    return sub(vector(step.x_0[b]), vector(step.x_0[a])), sub(vector(step.x_f[b]), vector(step.x_f[a]))
 
 
 @inner
@@ -267,8 +281,7 @@ def add_pair(step, a, b, F):
 @inner
 def add_direction(model, discrete, step, m, e, G):
     """Add a load on direction e of a marker, with the work G · dE."""
-    E_0, E_1 = ends(step, m, e)
-    put_sum(step.T[step.is_unit, m], 0, cross(scaled(0.5, add(E_0, E_1)), G))
+    put_sum(step.T[step.is_unit, m], 0, cross(mean_direction(step, m, e), G))
     i = model.markers.body[m]
     if i >= 0 and discrete.turns[m]:
         put_sum(step.m[step.is_unit, m], 0, cross(turned(step.E_mean[m], e), turned_back(step.R_m[i], G)))

@@ -13,7 +13,13 @@ from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.joints.relative_motion import distance, prescribed_at
 from floatframe.engine.kernels.joints.row_formulas import HELD, by_code
 from floatframe.engine.kernels.vector import add, cross, dot, scaled, sub, turned, vector
-from floatframe.engine.structure_preserving.kernels.markers import add_direction, add_pair, ends
+from floatframe.engine.structure_preserving.kernels.markers import (
+    add_direction,
+    add_pair,
+    distances,
+    ends,
+    mean_direction,
+)
 from floatframe.model.joints.rows.kinds import (
     DISTANCE,
     DOT,
@@ -26,8 +32,8 @@ from floatframe.model.joints.rows.kinds import (
     TURN_B,
 )
 
-__all__ = ["add_reaction", "add_slide", "angle_loads", "angle_of", "force_of_row", "held", "mean_direction",
-           "mean_distance", "row_rate", "row_value"]  # fmt: skip
+__all__ = ["add_reaction", "add_slide", "angle_loads", "angle_of", "force_of_row", "held", "mean_distance",
+            "row_rate", "row_value"]  # fmt: skip
 
 
 #: the value function of rows that depend only on positions and time, shared with all other formulations
@@ -73,15 +79,8 @@ def point_axis(model, step, k, a, b):
 @inner
 def mean_distance(step, a, b):
     """Return the mean of the vector from A to B over the step."""
-    d_0 = sub(vector(step.x_0[b]), vector(step.x_0[a]))
-    return scaled(0.5, add(d_0, sub(vector(step.x_f[b]), vector(step.x_f[a]))))
-
-
-@inner
-def mean_direction(step, m, e):
-    """Return the mean of a marker's direction e over the step."""
-    E_0, E_1 = ends(step, m, e)
-    return scaled(0.5, add(E_0, E_1))
+    d_0, d_1 = distances(step, a, b)
+    return scaled(0.5, add(d_0, d_1))
 
 
 @inner
@@ -155,7 +154,7 @@ def row_rate(model, step, k, a, b, t):
     if kind == SLIDE:
         return -rate
     if kind == DISTANCE:
-        d = sub(vector(step.x_0[b]), vector(step.x_0[a]))
+        d, _ = distances(step, a, b)
         return -0.5 * rate * (dot(d, d) / (value * value) + 1.0)
     x, y, z = vector(model.rows.x[k]), vector(model.rows.y[k]), vector(model.rows.z[k])
     if kind == TURN_B:

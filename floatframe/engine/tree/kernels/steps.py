@@ -32,6 +32,8 @@ from floatframe.engine.kernels.generalized_alpha import (
     load_memory,
     load_state,
     mean_square,
+    newton_weights,
+    next_of_unknown,
     ratio_of_steps,
     roundoff_floor,
     settle_row,
@@ -286,7 +288,7 @@ def local_error(model, work, tree, joints, tangent, memory, order, h):
     for s in range(tree.slot.shape[0]):
         now, before = accelerations(work, tree, joints, memory, s)
         a = memory.a[tree.slot[s]]
-        jump = ((1 - alpha_f) * now + alpha_f * before - alpha_m * a) / (1 - alpha_m) - a
+        jump = next_of_unknown(a, before, now, alpha_m, alpha_f) - a
         tangent.step[s] = now
         put_acceleration(work, tree, joints, s, now + jump)
     for i in range(tree.parent.shape[0]):
@@ -342,10 +344,7 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
     converge, it restarts again with exact factors in every iteration, because an iterate that approximate factors have
     led far away does not return.
     """
-    alpha_m, alpha_f, beta, gamma = order.alpha_m, order.alpha_f, order.beta, order.gamma
-    c_k = beta * h * h
-    c_d = gamma * h
-    c_m = (1 - alpha_m) / (1 - alpha_f)
+    c_m, c_d, c_k = newton_weights(order, h)
     work.counted.no_number = 0
     work.counted.stopped = 0
     last, last_of_states, excess, wanted, allowed = math.inf, math.inf, math.inf, 0.0, 0.0
@@ -440,7 +439,7 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
                     return INACCURATE, -1, excess, error
             if iteration == 0 and not is_open:  # reactions are those of kept wrenches before their correction
                 evaluate_placed(model, work, tree, joints, c_k)
-            accept(model, work, memory, tree, joints, h, alpha_m, alpha_f)
+            accept(model, work, memory, tree, joints, order, h)
             return DONE, -1, excess, error
         if norm > SLOW * last and not is_small and (tangent.is_exact != 0 or made < iteration):
             work.solver.is_due = 1
@@ -464,8 +463,9 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
 
 
 @inner
-def accept(model, work, memory, tree, joints, h, alpha_m, alpha_f):
+def accept(model, work, memory, tree, joints, order, h):
     """(3): write the iterate and the new algorithmic accelerations into the memory."""
+    alpha_m, alpha_f = order.alpha_m, order.alpha_f
     put_reactions(model, work, tree, joints)
     for i in range(tree.parent.shape[0]):
         s0, end = tree.s0[i], tree.m0[i]
@@ -476,7 +476,7 @@ def accept(model, work, memory, tree, joints, h, alpha_m, alpha_f):
             if s < end or s >= tree.m0[i]:
                 now, before = accelerations(work, tree, joints, memory, s)
                 slot = tree.slot[s]
-                memory.a[slot] = ((1 - alpha_f) * now + alpha_f * before - alpha_m * memory.a[slot]) / (1 - alpha_m)
+                memory.a[slot] = next_of_unknown(memory.a[slot], before, now, alpha_m, alpha_f)
     for i in range(model.bodies.kind.shape[0]):
         put_euler_parameters(work.state.R[i], memory.p[i])
     keep_iterate(model, work, memory, h)

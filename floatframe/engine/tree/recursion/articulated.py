@@ -37,6 +37,7 @@ from floatframe.engine.tree.recursion.composite import (
     add_carried,
     along,
     along_rate,
+    body_matrix,
     flexible_column,
     moments_in_ground,
     rigid_blocks,
@@ -99,8 +100,7 @@ def three_rates(work, k, v, A, B, C):
 @loops
 def flexible(nodes, work, k):
     """Eliminate rates and modes of a flexible body; return the remaining blocks and whether the matrix is regular."""
-    n, v0, size = nodes.n_q[k], nodes.v0[k], nodes.n_z[k] + nodes.n_q[k]
-    H = work.H[nodes.h0[k] : nodes.h0[k + 1]].reshape((6 + n, 6 + n))
+    v0, size, H = nodes.v0[k], nodes.n_z[k] + nodes.n_q[k], body_matrix(nodes, work, k)
     G = work.G[nodes.g0[k] : nodes.g0[k + 1]].reshape((size, size))
     for j in range(size):
         flexible_column(nodes, work, H, k, j)
@@ -148,8 +148,7 @@ def articulate(nodes, work, model, marker_work):
         if n > 0:
             if not flexible(nodes, work, k):
                 d = 0.0
-            H = work.H[nodes.h0[k] : nodes.h0[k + 1]].reshape((6 + n, 6 + n))
-            A, B, C = top_blocks(H)
+            A, B, C = top_blocks(body_matrix(nodes, work, k))
         elif n_z == 1:
             A, B, C, d = one_rate(work, k, v0, A, B, C)
         elif n_z == 3:
@@ -159,8 +158,7 @@ def articulate(nodes, work, model, marker_work):
         if above >= 0:
             p = sub(vector(work.r_G[k]), vector(work.r_G[above]))
             if nodes.n_q[above] > 0:
-                size = 6 + nodes.n_q[above]
-                H = work.H[nodes.h0[above] : nodes.h0[above + 1]].reshape((size, size))
+                H = body_matrix(nodes, work, above)
                 add_carried(H, A, B, C, p, work.above[nodes.c0[k] : nodes.c0[k + 1]])
             else:
                 A, B, C = shifted_blocks(A, B, C, p)

@@ -11,7 +11,8 @@ Sources: Walker & Orin (1982); Featherstone (2008), chapter 6.
 """
 
 from floatframe.engine.kernels.body import block, body_forces, column, coupling, modal_block, moved_inertia
-from floatframe.engine.kernels.compiler.compilation import loops, small
+from floatframe.engine.kernels.compiler.compilation import loops, small, view
+from floatframe.engine.kernels.dense import part_of
 from floatframe.engine.kernels.model import C2, MASS
 from floatframe.engine.kernels.vector import (
     add,
@@ -39,6 +40,7 @@ __all__ = [
     "add_carried",
     "along",
     "along_rate",
+    "body_matrix",
     "body_moments",
     "evaluate_flexible",
     "flexible_column",
@@ -47,6 +49,13 @@ __all__ = [
     "rigid_blocks",
     "times_inertia",
 ]
+
+
+@view
+def body_matrix(nodes, work, k):
+    """Return H of node k's flexible body, (6 + n, 6 + n), as a view."""
+    n = 6 + nodes.n_q[k]
+    return work.H[nodes.h0[k] : nodes.h0[k + 1]].reshape((n, n))
 
 
 @small
@@ -76,12 +85,12 @@ def flexible_mass(nodes, work, model, marker_work, k):
     """Write H of node k's flexible body without its subtree, ground axes."""
     i, n = nodes.body[k], nodes.n_q[k]
     types, t, q0 = model.body_types, model.bodies.kind[i], nodes.q0[k]
-    H = work.H[nodes.h0[k] : nodes.h0[k + 1]].reshape((6 + n, 6 + n))
+    H = body_matrix(nodes, work, k)
     H[:, :] = 0.0
     A, B, C = rigid_blocks(work.mass[k], vector(work.s[k]), matrix(work.J[k]))
     put_blocks(H, A, B, C)
-    first = marker_work.bodies.C1[3 * q0 : 3 * (q0 + n)]
-    W, second, R = marker_work.bodies.W[9 * q0 : 9 * (q0 + n)], block(types, t, C2, 3 * n), work.R_G[k]
+    first = part_of(marker_work.bodies.C1, 3, q0, n)
+    W, second, R = part_of(marker_work.bodies.W, 9, q0, n), block(types, t, C2, 3 * n), work.R_G[k]
     for j in range(n):
         b, B = turned(R, column(first, n, j)), turned(R, coupling(second, W, n, j))
         put(H[6 + j], 0, b)
@@ -131,8 +140,7 @@ def add_to_parent(nodes, work, k):
     p = sub(vector(work.r_G[k]), vector(work.r_G[above]))
     m, s, J = work.mass[k], vector(work.s[k]), matrix(work.J[k])
     if nodes.n_q[above] > 0:
-        n = 6 + nodes.n_q[above]
-        H = work.H[nodes.h0[above] : nodes.h0[above + 1]].reshape((n, n))
+        H = body_matrix(nodes, work, above)
         A, B, C = rigid_blocks(m, s, J)
         add_carried(H, A, B, C, p, work.above[nodes.c0[k] : nodes.c0[k + 1]])
     s_p, J_p = moved_inertia(m, s, J, p)
@@ -207,8 +215,7 @@ def along_rate(nodes, work, k, i):
 @loops
 def flexible_columns(nodes, work, M, k):
     """Write U for the rates of a flexible body, and its block of M (3)."""
-    n, size = nodes.n_q[k], nodes.n_z[k] + nodes.n_q[k]
-    H = work.H[nodes.h0[k] : nodes.h0[k + 1]].reshape((6 + n, 6 + n))
+    size, H = nodes.n_z[k] + nodes.n_q[k], body_matrix(nodes, work, k)
     for j in range(size):
         v = flexible_column(nodes, work, H, k, j)
         for i in range(size):

@@ -52,7 +52,7 @@ from floatframe.engine.tree.kernels.spatial import (
     turned_power,
     wrench_of_column,
 )
-from floatframe.engine.tree.recursion.composite import along, body_moments, times_inertia
+from floatframe.engine.tree.recursion.composite import along, body_matrix, body_moments, times_inertia
 
 __all__ = ["force_tangents"]
 
@@ -248,7 +248,7 @@ def go_up_tangents(nodes, dense, k, v, f_z, t_z, f_d, t_d):
 def tangent_columns(nodes, work, dense, model, marker_work, k, c_d, c_k, first):
     """Add the tangent of flexible body k's equations by its modes (c_k = 1) or modal rates (c_d = 1) (4)."""
     n, vq = nodes.n_q[k], nodes.vq[k]
-    H = work.H[nodes.h0[k] : nodes.h0[k + 1]].reshape((6 + n, 6 + n))
+    H = body_matrix(nodes, work, k)
     body_tangent(model, marker_work, nodes.body[k], 0.0, c_d, c_k, H, marker_work.bodies.by_turn[: 6 + n])
     R, r = work.R_G[k], vector(work.r_G[k])
     out = dense.by_z if first == 0 else dense.by_rate

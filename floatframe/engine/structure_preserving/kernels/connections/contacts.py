@@ -21,9 +21,10 @@ from floatframe.engine.structure_preserving.kernels.markers import (
     add_pair,
     begin_unit_load,
     end_unit_load,
+    mean_direction,
     turning,
 )
-from floatframe.engine.structure_preserving.kernels.rows import add_slide, mean_direction, mean_distance
+from floatframe.engine.structure_preserving.kernels.rows import add_slide, mean_distance
 
 __all__ = ["contact_load", "speed_of_approach"]
 

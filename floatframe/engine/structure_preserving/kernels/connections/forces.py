@@ -1,14 +1,14 @@
 """Loads of bushings and user forces in a structure-preserving step."""
 
-from floatframe.engine.kernels.body import axial
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.bushing import continued, law, rotation_vector
 from floatframe.engine.kernels.connections.coordinate import ends_and_row
-from floatframe.engine.kernels.connections.user_force import element_of, user_outputs
+from floatframe.engine.kernels.connections.user_force import element_of, input_parts, user_outputs
 from floatframe.engine.kernels.rotation import exp_matrix
 from floatframe.engine.kernels.time_function import time_function
 from floatframe.engine.kernels.vector import (
     add,
+    axial,
     cross,
     matrix,
     matrix_sum,
@@ -37,6 +37,7 @@ from floatframe.engine.structure_preserving.kernels.markers import (
     add_direction,
     add_pair,
     change,
+    distances,
     mean_jacobian,
     relative_cayley,
 )
@@ -88,8 +89,8 @@ def bushing_load(model, discrete, step, c):
     """Add the loads of bushing c; return the work supplied by its tables and dissipated by its damping."""
     a, b, i = model.connections.a[c], model.connections.b[c], model.connections.item[c]
     A, B, d = mean_axes(step, a), mean_axes(step, b), mean_distance(step, a, b)
-    s_0 = turned_back(step.A_0[a], sub(vector(step.x_0[b]), vector(step.x_0[a])))
-    s_1 = turned_back(step.A_f[a], sub(vector(step.x_f[b]), vector(step.x_f[a])))
+    d_0, d_1 = distances(step, a, b)
+    s_0, s_1 = turned_back(step.A_0[a], d_0), turned_back(step.A_f[a], d_1)
     share, angle = model.bushings.share[i], model.bushings.angle[i]
     R_0 = product(transposed(step.A_0[a]), matrix(step.A_0[b]))
     th_0, th_1 = rotation_vector(step.A_0[a], step.A_0[b]), rotation_vector(step.A_f[a], step.A_f[b])
@@ -140,17 +141,13 @@ def bushing_load(model, discrete, step, c):
 
 
 @inner
-def put_states(model, work, step, c, first, part):
-    """Write the states of user force c at the fraction `part` of the step to the inputs, from index `first` on.
-
-    Return the number of inputs.
-    """
+def put_states(model, step, c, z, part):
+    """Write the states of user force c at the fraction `part` of the step into z."""
     u = model.connections.item[c]
     change0 = step.load.shape[0] + step.f.shape[0] + model.users.state0[u]
     for s in range(model.users.n_states[u]):
         k = model.states.row[model.users.state0[u] + s]
-        work.users.inputs[first + s] = step.known[k] + part * step.z[change0 + s]
-    return first + model.users.n_states[u]
+        z[s] = step.known[k] + part * step.z[change0 + s]
 
 
 @inner
@@ -158,23 +155,23 @@ def user_force_load(model, work, discrete, step, c):
     """Add the loads of user force c, and return the supplied work."""
     i = element_of(model, c)
     first, last = model.elements.coordinate0[i], model.elements.coordinate0[i + 1]
-    n, inputs = last - first, work.users.inputs
-    inputs[0] = step.t_force
+    work.users.inputs[0] = step.t_force
+    x, v, z = input_parts(work.users.inputs, last - first)
     for p in range(first, last):
         a, b, k = ends_and_row(model, p)
         change = coordinate_change(model, discrete, step, k, a, b)
         begin, end = coordinate_ends(model, step, k, a, b, change)
-        inputs[1 + p - first] = counted(model, k, end, step.known[k]) - 0.5 * (end - begin)
-        inputs[1 + n + p - first] = coordinate_rate(model, discrete, step, k, a, b)
-    n_in = put_states(model, work, step, c, 1 + 2 * n, 0.0 if step.is_still else 0.5)
-    user_outputs(model, work, c, n_in)
+        x[p - first] = counted(model, k, end, step.known[k]) - 0.5 * (end - begin)
+        v[p - first] = coordinate_rate(model, discrete, step, k, a, b)
+    put_states(model, step, c, z, 0.0 if step.is_still else 0.5)
+    user_outputs(model, work, c)
     given = 0.0
     for p in range(first, last):
         if model.coordinates.force[p] >= 0:
             Q = work.users.outputs[model.coordinates.core[p] - model.elements.core[i]]
             a, b, k = ends_and_row(model, p)
             add_impulsive_force(model, discrete, step, k, a, b, Q)
-            given += Q * inputs[1 + n + p - first] * step.h
+            given += Q * v[p - first] * step.h
     return given
 
 
@@ -183,18 +180,18 @@ def user_state_residual(model, work, discrete, step, c):
     """Write the residuals dz - h g of the states of user force c, with g in the middle of the step."""
     i, u = element_of(model, c), model.connections.item[c]
     first, last = model.elements.coordinate0[i], model.elements.coordinate0[i + 1]
-    n, inputs = last - first, work.users.inputs
-    inputs[0] = 0.5 * (step.t_0 + step.end.state.time)
+    x, v, z = input_parts(work.users.inputs, last - first)
+    work.users.inputs[0] = 0.5 * (step.t_0 + step.end.state.time)
     for p in range(first, last):
         a, b, k = ends_and_row(model, p)
         begin, end = ends_of_step(model, step, k, a, b)
-        inputs[1 + p - first] = 0.5 * (begin + end)
+        x[p - first] = 0.5 * (begin + end)
         rate = (end - begin) / step.h
         if model.rows.is_angle[k] and not step.is_still:
             rate = coordinate_rate(model, discrete, step, k, a, b)
-        inputs[1 + n + p - first] = rate
-    n_in = put_states(model, work, step, c, 1 + 2 * n, 0.5)
-    user_outputs(model, work, c, n_in)
+        v[p - first] = rate
+    put_states(model, step, c, z, 0.5)
+    user_outputs(model, work, c)
     change0 = step.load.shape[0] + step.f.shape[0] + model.users.state0[u]
     for s in range(model.users.n_states[u]):
         rate = work.users.outputs[model.users.n_forces[u] + s]

@@ -32,7 +32,6 @@ roundoff.
 
 import math
 
-from floatframe.engine.kernels.body import axial
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.element_law import (
     FIRST,
@@ -44,6 +43,7 @@ from floatframe.engine.kernels.connections.element_law import (
 from floatframe.engine.kernels.rotation import exp_matrix
 from floatframe.engine.kernels.vector import (
     add,
+    axial,
     cross,
     dot,
     matrix,
