@@ -30,6 +30,7 @@ __all__ = [
     "bug",
     "commands",
     "guarded",
+    "hertz",
     "output_path",
     "print_error",
     "print_table",
@@ -367,6 +368,11 @@ def stages(*, remaining: bool = False) -> Iterator[Stages]:
     columns = [TextColumn("{task.description:<28}"), BarColumn(bar_width=30), TaskProgressColumn(), TimeElapsedColumn()]
     with Progress(*columns, *([TimeRemainingColumn()] if remaining else []), console=console, transient=True) as show:
         yield Stages(show)
+
+
+def hertz(value: float | None) -> str:
+    """Return a frequency with six digits [Hz]; "static" for a shape without mass."""
+    return "static" if value is None else f"{value:.6g}"
 
 
 def vector_words(values: Any, scale: float | None = None) -> str:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cms.cli.arguments import ModalFile
-from cms.cli.console import guarded, print_table, say, vector_words
+from cms.cli.console import guarded, hertz, print_table, say, vector_words
 
 if TYPE_CHECKING:
     from cms.body.reduced_body import ReducedBody
@@ -236,11 +236,6 @@ def stress_words(stress: Any) -> str:
     places = ["at the kept nodes"] if stress["nodal"] else []
     places += [f"at {stress['points']} points"] if stress["points"] else []
     return " and ".join(places) or "not kept"
-
-
-def hertz(value: float | None) -> str:
-    """Return a frequency with six digits [Hz]; "" for a shape without mass."""
-    return "static" if value is None else f"{value:.6g}"
 
 
 def percent(value: float | None) -> str:

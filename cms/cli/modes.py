@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cms.cli.arguments import ModalFile
-from cms.cli.console import guarded, output_path, print_table, say, say_written, stages, vector_words
+from cms.cli.console import guarded, hertz, output_path, print_table, say, say_written, stages, vector_words
 
 if TYPE_CHECKING:
     from cms.body.reduced_body import ReducedBody
@@ -126,7 +126,7 @@ def print_modes(record: dict[str, Any]) -> None:
     print_table(
         "Columns of the mode set",
         ("column>", "Hz>", "what it is", ""),
-        [(c["number"], _hertz(c["frequency_hz"]), c["label"], "dropped" if c["dropped"] else "") for c in columns],
+        [(c["number"], hertz(c["frequency_hz"]), c["label"], "dropped" if c["dropped"] else "") for c in columns],
     )
     frame, n_rigid = record["frame"], record["rigid_body_motions_removed"]
     at = f" at interface {frame['at']}" if frame["at"] else ""
@@ -136,13 +136,9 @@ def print_modes(record: dict[str, Any]) -> None:
     print_table(
         "Modes of the reduced body, the frame B held, by ascending frequency; static shapes last",
         ("mode>", "Hz>", "energy from"),
-        [(mode["number"], _hertz(mode["frequency_hz"]), mode["label"]) for mode in record["modes"]],
+        [(mode["number"], hertz(mode["frequency_hz"]), mode["label"]) for mode in record["modes"]],
     )
-    free = ", ".join(_hertz(f) for f in record["free_frequencies_hz"])
+    free = ", ".join(hertz(f) for f in record["free_frequencies_hz"])
     say(f"The free body (no frame held) vibrates at [Hz]: {free or 'none'}")
     options = [(key, value) for key, value in record["options"].items()]
     print_table("Options", ("", ""), options)
-
-
-def _hertz(value: float | None) -> str:
-    return "static" if value is None else f"{value:.6g}"

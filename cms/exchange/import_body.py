@@ -20,6 +20,7 @@ from cms.exchange.programs.nastran import is_nastran, read_nastran
 from cms.exchange.programs.sid_fem_reader import is_sid_fem, read_sid_fem, read_sid_fem_fembeam
 from cms.reduction.basis.damping import Damping
 from cms.reduction.basis.frames import Frame
+from fe_models.body.fe_body import dofs_of
 from fe_models.errors import FeModelsError
 from fe_models.files.matrices.body import numbers_of
 from fe_models.files.matrices.foreign_matrices import SCALAR, ForeignMatrices
@@ -232,7 +233,7 @@ def of_matrices(foreign: ForeignMatrices, name: str, places: Places, boundary: S
                 f"boundary: {len(boundary)} nodes have {6 * len(boundary)} dofs, the matrices have {n} rows; expected "
                 "at least one node, and not more dofs than rows"
             )
-        own = np.stack([np.repeat(np.asarray(boundary), 6), np.tile(np.arange(6), len(boundary))], axis=1)
+        own = dofs_of(np.asarray(boundary), 6)
         n_modes = n - len(own)
         modal = np.stack([1 + np.arange(n_modes), np.full(n_modes, SCALAR)], axis=1)
         note = f"the first {len(own)} rows are six dofs of each of nodes {list(map(int, boundary))}, as given"

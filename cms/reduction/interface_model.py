@@ -25,7 +25,7 @@ from cms.body.reduced_body import ReducedBody, ReducedInterface
 from cms.errors import ExportError
 from cms.reduction.frame_conversion import rigid_mass, six_motions
 from fe_models.body.rigid_motion import rigid_motion_of_points
-from fe_models.foundation.arrays import MOTION_COMPONENTS, Array, IntArray
+from fe_models.foundation.arrays import MOTION_COMPONENTS, Array, IntArray, symmetric_part
 
 __all__ = ["BoundaryNode", "InterfaceModel", "interface_model"]
 
@@ -114,7 +114,7 @@ def interface_model(body: ReducedBody) -> InterfaceModel:
     X = fixed_modes(K_N, N.T @ M @ N)
     T = np.hstack([Z, N @ X])
     n_b = len(B)
-    K_y, M_y, D_y = (symmetric(T.T @ matrix @ T) for matrix in (K, M, D))
+    K_y, M_y, D_y = (symmetric_part(T.T @ matrix @ T) for matrix in (K, M, D))
     K_y[:n_b, n_b:] = K_y[n_b:, :n_b] = 0.0  # step (2); nonzero values are rounding
     for matrix in (K_y, M_y):  # step (3)
         inner = matrix[n_b:, n_b:]
@@ -219,12 +219,8 @@ def fixed_modes(K_N: Array, M_N: Array) -> Array:
     """Return the eigenvectors by ascending frequency, scaled to unit mass, or to unit stiffness if massless."""
     if not len(K_N):
         return K_N
-    mu, X = la.eigh(symmetric(M_N), symmetric(K_N))  # M x = mu K x, because K is definite but M may be singular
+    # M x = mu K x, because K is definite but M may be singular
+    mu, X = la.eigh(symmetric_part(M_N), symmetric_part(K_N))
     mu, X = mu[::-1], X[:, ::-1]
     has_mass = mu > MASSLESS * mu[0]
     return np.asarray(X / np.sqrt(np.where(has_mass, mu, 1.0)))
-
-
-def symmetric(matrix: Array) -> Array:
-    """Return the symmetric part; the matrix is symmetric to rounding."""
-    return np.asarray((matrix + matrix.T) / 2)

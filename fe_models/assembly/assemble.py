@@ -32,7 +32,7 @@ from fe_models.assembly.tables.places import (
     load_cases_of,
 )
 from fe_models.assembly.tables.shells import shell_properties
-from fe_models.body.fe_body import FEBody, Interface
+from fe_models.body.fe_body import FEBody, Interface, dofs_of
 from fe_models.body.load_cases import LoadCase
 from fe_models.body.loads import nodal_load, pressure_load
 from fe_models.checks.mesh_report import report_mesh
@@ -503,7 +503,7 @@ def _load_cases(model: FEModel, joined: Joined, meshes: list[Mesh]) -> list[Load
 def _pressure(joined: Joined, mesh: Mesh, name: str, table: Any) -> LoadCase:
     """Return the load case of a pressure on faces of one of the solid meshes."""
     body = joined.body
-    dofs = np.stack([np.repeat(np.arange(len(mesh.nodes)), 3), np.tile(np.arange(3), len(mesh.nodes))], axis=1)
+    dofs = dofs_of(np.arange(len(mesh.nodes)), 3)
     nothing = sp.csc_array((len(dofs), len(dofs)))
     alone = replace(
         body, M=nothing, K=nothing, D=None, nodes=mesh.nodes, dofs=dofs,

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from fe_models.body.fe_body import FEBody
+from fe_models.body.fe_body import FEBody, dofs_of
 from fe_models.body.material import Material
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
@@ -79,7 +79,7 @@ def rod_body(mesh: LineMesh, rods: Mapping[str, Rod], *, name: str, units: Units
         M=_assembled(M.reshape(-1, 6, 6), dofs, 3 * n_nodes),
         K=_assembled(K.reshape(-1, 6, 6), dofs, 3 * n_nodes),
         nodes=mesh.nodes,
-        dofs=np.stack([np.repeat(np.arange(n_nodes), 3), np.tile(np.arange(3), n_nodes)], axis=1),
+        dofs=dofs_of(np.arange(n_nodes), 3),
         units=units,
         node_volumes=volumes,
         numbering=line_numbering(mesh, np.zeros(0, np.int64), np.zeros(0, np.int64)),

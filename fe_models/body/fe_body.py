@@ -42,6 +42,7 @@ __all__ = [
     "NoNodalRotations",
     "Recovery",
     "StressPointModel",
+    "dofs_of",
 ]
 
 MULTIPLIER = -1  #: component number of a Lagrange multiplier of a distributing (RBE3) interface
@@ -540,6 +541,11 @@ class FEBody:
     def with_load_cases(self, *load_cases: LoadCase) -> "FEBody":
         """Return the body with these load cases added."""
         return replace(self, load_cases=(*self.load_cases, *load_cases))
+
+
+def dofs_of(nodes: IntArray, n: int) -> IntArray:
+    """Return node and component of the first n dofs of each node, (n n_nodes, 2)."""
+    return np.stack([np.repeat(nodes, n), np.tile(np.arange(n), len(nodes))], axis=1)
 
 
 def put_translations(field_: Array, dofs: IntArray, u: Array) -> None:

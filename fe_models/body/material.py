@@ -19,6 +19,7 @@ __all__ = [
     "Material",
     "OrthotropicMaterial",
     "assign_materials",
+    "groups_of",
     "material_words",
     "require_isotropic",
 ]
@@ -345,15 +346,17 @@ def assign_materials(
     missing = {kind: np.flatnonzero(index < 0) for kind, index in number.items() if (index < 0).any()}
     if missing:
         counts = ", ".join(f"{rows.size} {kind}" for kind, rows in missing.items())
-        raise MaterialError(f"materials: cells without a material: {counts}; {groups_of(mesh, missing)}")
+        raise MaterialError(
+            f"materials: cells without a material: {counts}; {groups_of(mesh.cell_sets, missing, 'a material')}"
+        )
     return used, number
 
 
-def groups_of(mesh: Mesh, missing: Mapping[str, IntArray]) -> str:
-    """Name the groups of cells without material."""
+def groups_of(sets: Mapping[str, Mapping[str, IntArray]], missing: Mapping[str, IntArray], what: str) -> str:
+    """Name the groups of cells that lack something, such as a material."""
     groups = [
         group
-        for group, by_type in mesh.cell_sets.items()
+        for group, by_type in sets.items()
         if any(np.isin(missing[kind], by_type[kind]).any() for kind in missing if kind in by_type)
     ]
-    return f"they are in the groups {', '.join(groups)}: give these a material" if groups else "they are in no group"
+    return f"they are in the groups {', '.join(groups)}: give these {what}" if groups else "they are in no group"

@@ -14,7 +14,7 @@ from fe_models.checks.report import Finding, Report
 from fe_models.elements.beams.attachments import RigidLink, Spring
 from fe_models.elements.shells.quality import WARP_LIMIT, cell_quality
 from fe_models.elements.shells.skin import cell_edges
-from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
@@ -112,8 +112,7 @@ def report_shell(
     edges = cell_edges(tuple(mesh.cells.values()))
     part, found = _parts(mesh, [edges.nodes, mesh.lines], "cell, stiffener", springs, links)
     findings += found
-    size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
-    close = cKDTree(mesh.nodes).query_pairs(COINCIDENCE * size) if size else set()
+    size, close = _coincident(mesh.nodes)
     if close:
         pair = min(close)
         findings.append(
@@ -242,8 +241,7 @@ def report_frame(
         Springs and rigid links, which also join parts.
     """
     part, findings = _parts(mesh, [mesh.lines], "line", springs, links)
-    size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
-    close = cKDTree(mesh.nodes).query_pairs(COINCIDENCE * size) if size else set()
+    size, close = _coincident(mesh.nodes)
     apart = [pair for pair in close if part[pair[0]] != part[pair[1]]]
     if apart:
         findings.append(
@@ -296,3 +294,9 @@ def _units(units: Units, size: float, materials: Iterable[AnyMaterial]) -> list[
 
 def _names(mesh: ShellMesh | LineMesh, nodes: Iterable[int]) -> list[str]:
     return [str(mesh.node_numbers[node] if mesh.node_numbers.size else node) for node in nodes]
+
+
+def _coincident(nodes: Array) -> tuple[float, set[tuple[int, int]]]:
+    """Return the length of the diagonal of the nodes, and the pairs of nodes that lie at one place."""
+    size = float(np.linalg.norm(np.ptp(nodes, axis=0)))
+    return size, cKDTree(nodes).query_pairs(COINCIDENCE * size) if size else set()

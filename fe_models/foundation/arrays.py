@@ -20,8 +20,10 @@ __all__ = [
     "frozen",
     "given",
     "require_finite",
+    "require_rows",
     "require_shape",
     "symmetric_csc",
+    "symmetric_part",
     "tilde",
 ]
 
@@ -92,6 +94,12 @@ def require_shape(where: str, array: Array | IntArray, shape: tuple[int, ...]) -
         raise BodyError(f"{where}: expected shape {shape}, got {array.shape}")
 
 
+def require_rows(where: str, u: Any, n_rows: int) -> None:
+    """Raise `BodyError` unless u is two-dimensional with this number of rows."""
+    if np.ndim(u) != 2 or np.shape(u)[0] != n_rows:
+        raise BodyError(f"{where}: u: expected columns over {n_rows} dofs, got {np.shape(u)}")
+
+
 def symmetric_csc(where: str, matrix: Any, n: int) -> sp.csc_array:
     """Return the matrix as CSC, (n, n), with sorted indices, after checks of shape, finiteness and symmetry."""
     # for a symmetric matrix, compressed rows equal compressed columns
@@ -106,6 +114,11 @@ def symmetric_csc(where: str, matrix: Any, n: int) -> sp.csc_array:
     if defect > SYMMETRY_DEFECT:
         raise BodyError(f"{where}: expected a symmetric matrix, got |A - A.T| = {defect:.2e} |A|")
     return csc
+
+
+def symmetric_part(A: Array) -> Array:
+    """Return (A + Aᵀ)/2, for matrices that are symmetric except for rounding errors."""
+    return np.asarray((A + A.T) / 2)
 
 
 def symmetry_defect(csc: sp.csc_array) -> float:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from fe_models.foundation.arrays import Array
 
-__all__ = ["damage", "nearest", "node_list", "number_list", "quoted", "shortened"]
+__all__ = ["damage", "is_number", "nearest", "node_list", "number_list", "quoted", "shortened"]
 
 LONGEST = 80  #: largest number of characters of a name or value in a message
 MOST_CHOICES = 40  #: largest number of names in a message
@@ -42,6 +42,15 @@ def number_list(values: Iterable[float], scale: float | None = None) -> str:
     numbers = list(values)
     scale = max(map(abs, numbers), default=0.0) if scale is None else scale
     return ", ".join(f"{0 if abs(value) <= 1e-12 * scale else value:.6g}" for value in numbers)
+
+
+def is_number(word: str) -> bool:
+    """Return whether a word is a number."""
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
 
 
 def quoted(value: object) -> str:

@@ -2,7 +2,12 @@
 
 import math
 
-__all__ = ["factor", "share", "superscript"]
+__all__ = ["factor", "number", "share", "superscript"]
+
+
+def number(value: float | None) -> str:
+    """Return a value with three digits; "" if there is none."""
+    return "" if value is None or not math.isfinite(value) else f"{value:.3g}"
 
 
 def share(value: float) -> str:

@@ -1,7 +1,6 @@
 """The command `cms check`: verdicts about a modal file, alone or compared with its full model."""
 
 import json
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Any
 
 import typer
 
+from cms.assessment.quality.numbers import number
 from cms.assessment.quality.record import QualityRecord, has_failed, worst
 from cms.body.reduced_body import ReducedBody
 from cms.cli.console import output_path, print_table, say, stages
@@ -99,11 +99,6 @@ def print_records(title: str, name: str, records: Sequence[QualityRecord]) -> No
         f"{name} {WORDS[worst(records)]}: "
         + ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count)
     )
-
-
-def number(value: float | None) -> str:
-    """Return a value with three digits; "" for None."""
-    return "" if value is None or not math.isfinite(value) else f"{value:.3g}"
 
 
 # the command `cms accept`: the acceptance document of a reduced body --------------------------------------------------

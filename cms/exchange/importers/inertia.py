@@ -10,7 +10,7 @@ from cms.body.invariants import INERTIA_TERMS, Moments, moments_from_gram
 from cms.body.reduced_body import BodyFrame
 from cms.errors import ForeignBodyError
 from cms.reduction.basis.matrix_moments import gram_from_matrices
-from fe_models.body.fe_body import FEBody
+from fe_models.body.fe_body import FEBody, dofs_of
 from fe_models.body.material import Material
 from fe_models.elements.solids.body import solid_body
 from fe_models.files.matrices.foreign_matrices import ForeignMatrices
@@ -138,7 +138,7 @@ def moments_of_masses(
         if lost:
             raise ForeignBodyError(f"nodal masses: nodes {lost[:6]} are not among those of the superelement")
         c = np.array([places[int(number)] for number in numbers])
-        phi = shapes(translations_of(numbers)).reshape(len(numbers), 3, -1)
+        phi = shapes(dofs_of(numbers, 3)).reshape(len(numbers), 3, -1)
         n = phi.shape[2]
         a = np.concatenate([np.ones((len(c), 1)), c, phi.reshape(len(c), 3 * n)], axis=1)
         gram, is_exact, words = np.asarray(a.T @ (mass[:, None] * a)), False, f"{len(mass)} nodal masses"
@@ -148,11 +148,6 @@ def moments_of_masses(
     else:
         gram, is_exact, words = gram_of_mesh(inertia, shapes, places, units), True, "mesh and density"
     return replace(moments_in_frame(gram, frame), is_exact=is_exact), words
-
-
-def translations_of(numbers: IntArray) -> IntArray:
-    """Return (node number, component) of the translations of nodes, node-major, (3 n, 2)."""
-    return np.stack([np.repeat(numbers, 3), np.tile(np.arange(3), len(numbers))], axis=1).astype(np.int64)
 
 
 def gram_of_full_mass(
@@ -193,7 +188,7 @@ def gram_of_mesh(inertia: MeshMass, shapes: Shapes, places: Mapping[int, Array],
     }
     body = solid_body(mesh, materials[""] if "" in materials else materials, name="mesh beside", units=units)
     assert body.element_model is not None
-    return body.element_model.mass_gram(shapes(translations_of(numbers)))
+    return body.element_model.mass_gram(shapes(dofs_of(numbers, 3)))
 
 
 def moments_in_frame(gram: Array, frame: BodyFrame, missing: tuple[str, ...] = ()) -> Moments:

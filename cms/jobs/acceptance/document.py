@@ -10,6 +10,7 @@ import numpy as np
 
 from cms.assessment.quality.body_record import body_record, body_size
 from cms.assessment.quality.errors import QualityError
+from cms.assessment.quality.numbers import number
 from cms.assessment.quality.of_body.effective_mass import DIRECTIONS, EffectiveMass
 from cms.assessment.quality.record import QualityRecord
 from cms.assessment.rendering import Scene, Surface, Triad, render_picture
@@ -319,11 +320,6 @@ def mesh_part(a: Acceptance) -> Section:
         labels = [f"{n} dofs, Hz>" for n in error.estimate.n_dof]
         blocks.append(TextTable(("mode>", *labels, "estimated error %>"), rows, (0.1, 0.3, 0.3, 0.3)))
     return Section("mesh", "Error of the mesh", tuple(blocks), short="Mesh")
-
-
-def number(value: float | None) -> str:
-    """Return a value with three digits; "none" if there is no value."""
-    return "" if value is None or not math.isfinite(value) else f"{value:.3g}"
 
 
 def vector(values: Sequence[float] | Iterable[float], scale: float | None = None) -> str:

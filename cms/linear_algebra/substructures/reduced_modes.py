@@ -11,7 +11,7 @@ from cms.linear_algebra.solvers.factorization import Inertia
 from cms.linear_algebra.solvers.registry import solver_of
 from cms.linear_algebra.substructures.reduced_mass import ReducedMass
 from cms.linear_algebra.substructures.tree import SubstructureTree
-from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.arrays import Array, IntArray, symmetric_part
 from fe_models.foundation.sparse.sparse_product import SymmetricProduct
 from fe_models.foundation.tall.columns import combine, combined, inner
 
@@ -202,14 +202,10 @@ def _widened(omega2: Array, M: ReducedMass, lam: Array, Z: Array, is_new: NDArra
     root = np.sqrt(omega2[is_new])[:, None] * d
     B = inner(root, root)  # (2)
     del root
-    G = np.eye(len(lam)) + B / lam + (B / lam).T + _symmetric(inner(d, M.of(is_new) @ d))
+    G = np.eye(len(lam)) + B / lam + (B / lam).T + symmetric_part(inner(d, M.of(is_new) @ d))
     lam, C = la.eigh(np.diag(lam) + B, G)  # (3)
     whole[~is_new], whole[is_new] = Z, d
     return lam, combined(whole, C)
-
-
-def _symmetric(A: Array) -> Array:
-    return (A + A.T) / 2
 
 
 def _is_settled(before: Array, lam: Array, cut: float) -> bool:

@@ -13,7 +13,7 @@ from cms.modes.families.static_modes import boundary_names
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets.free_interface import rubin
 from fe_models.body.fe_body import FEBody
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, symmetric_part
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.records import ArrayShape, checked_fields
 from fe_models.foundation.tall.columns import gram, in_memory
@@ -87,7 +87,7 @@ def _macneal_pencil(families: Families, modes: ModeSet) -> ReducedPencil:
     free = np.arange(n_r, n - n_b)
     M[free, free] = 1.0
     K[free, free] = (2 * np.pi * modes.frequencies[free]) ** 2
-    K[residual, residual] = _symmetric(L[:, residual])
+    K[residual, residual] = symmetric_part(L[:, residual])
     return ReducedPencil("macneal", M, K, modes.labels, L)
 
 
@@ -119,7 +119,7 @@ def dual_craig_bampton_pencil(
         M[force, force] = gram(Psi_d, body.M @ Psi_d)
         K[:, force] = -macneal.interface.T
         K[force, :] = -macneal.interface
-        K[force, force] = -_symmetric(macneal.interface[:, force])
+        K[force, force] = -symmetric_part(macneal.interface[:, force])
         labels = (*macneal.labels[: n - n_b], *boundary_names(body, "force")[0])
         return ReducedPencil("dual-craig-bampton", M, K, labels, np.eye(n)[force], is_dual=True)
 
@@ -140,9 +140,9 @@ def receptance(pencil: ReducedPencil, omega: float) -> Array:
     try:
         response = L @ la.solve(dynamic / np.outer(size, size), L.T, assume_a="sym")
         if not pencil.is_dual:
-            return _symmetric(response)
+            return symmetric_part(response)
         lever = np.sqrt(np.abs(np.diag(response)))
-        return -_symmetric(la.inv(response / np.outer(lever, lever)) / np.outer(lever, lever))
+        return -symmetric_part(la.inv(response / np.outer(lever, lever)) / np.outer(lever, lever))
     except la.LinAlgError as error:
         raise ModeSetError(f"reduced pencil {pencil.name!r}: omega = {omega:g} is one of its frequencies") from error
 
@@ -185,7 +185,3 @@ def _frequencies(K: Array, M: Array) -> Array:
     mu = la.eigvalsh(basis.T @ M @ basis) * omega2
     mu = mu[mu > INFINITE]
     return np.sort(np.sqrt(np.maximum(omega2 * (1 - mu) / mu, 0.0))) / (2 * np.pi)
-
-
-def _symmetric(A: Array) -> Array:
-    return (A + A.T) / 2

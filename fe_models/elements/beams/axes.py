@@ -1,12 +1,14 @@
 """Local axes of straight lines, and the map from nodal dofs to the dofs at the ends of the beam axis."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from fe_models.errors import BeamError
 from fe_models.foundation.arrays import Array, tilde
 from fe_models.meshes.line_mesh import LineMesh
 
-__all__ = ["LineGeometry", "line_geometry"]
+__all__ = ["LineGeometry", "line_geometry", "stress_directions"]
 
 PARALLEL = 1e-6  #: sine of the angle between a line and its orientation vector, below which the y axis is undefined
 
@@ -97,3 +99,14 @@ def line_geometry(mesh: LineMesh, orientations: Array, section_offsets: Array) -
 def _node(mesh: LineMesh, line: int) -> int:
     node = int(mesh.lines[line, 0])
     return int(mesh.node_numbers[node]) if mesh.node_numbers.size else node
+
+
+def stress_directions(R: Array, pairs: Sequence[tuple[int, int]]) -> Array:
+    """Return the stress xx yy zz yz xz xy in mesh axes for unit stresses ij in local axes R, (n, 6, n_pairs)."""
+    columns = []
+    for i, j in pairs:
+        tensor = np.einsum("na,nb->nab", R[:, :, i], R[:, :, j])
+        if i != j:
+            tensor = tensor + tensor.transpose(0, 2, 1)
+        columns.append(np.stack([tensor[:, a, b] for a, b in ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))], axis=1))
+    return np.stack(columns, axis=2)

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 import scipy.sparse as sp
 
-from fe_models.body.fe_body import FEBody, Interface, Recovery
+from fe_models.body.fe_body import FEBody, Interface, Recovery, dofs_of
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.body.unit_check import warn_of_materials
 from fe_models.elements.beams.attachments import PointMass, RigidLink, Spring, point_slices, spring_matrix
@@ -91,9 +91,7 @@ def beam_body(
             D, dofs = spring_matrix(mesh.nodes, spring, np.asarray(spring.damping))
             damped.append((dofs[None], D[None]))
     skin = make_skin(mesh.nodes, mesh.lines, geometry, of_line, sections)
-    node_dofs = np.stack([np.repeat(np.arange(n_nodes), 6), np.tile(np.arange(6), n_nodes)], axis=1)
-    skin_nodes = n_nodes + np.arange(len(skin.points))
-    skin_dofs = np.stack([np.repeat(skin_nodes, 3), np.tile(np.arange(3), len(skin_nodes))], axis=1)
+    node_dofs, skin_dofs = dofs_of(np.arange(n_nodes), 6), dofs_of(n_nodes + np.arange(len(skin.points)), 3)
     body = FEBody(
         name=name,
         M=assembled([(piece.dofs, piece.mass_matrices()) for piece in pieces], 6 * n_nodes),

@@ -8,7 +8,7 @@ import numpy as np
 from fe_models.body.fe_body import NoNodalRotations
 from fe_models.body.rigid_motion import MassLoads
 from fe_models.elements.beams.attachments import Spring, spring_matrix
-from fe_models.elements.beams.axes import LineGeometry
+from fe_models.elements.beams.axes import LineGeometry, stress_directions
 from fe_models.elements.beams.element import end_forces_at_centroid
 from fe_models.elements.beams.elements import gauss_points
 from fe_models.elements.beams.geometric import (
@@ -21,8 +21,7 @@ from fe_models.elements.beams.geometric import (
 from fe_models.elements.beams.section_properties import SectionProperties
 from fe_models.elements.beams.skin import Skin
 from fe_models.elements.beams.slices import Slices
-from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.errors import BodyError
+from fe_models.foundation.arrays import Array, IntArray, require_rows
 
 __all__ = ["BeamModel"]
 
@@ -66,7 +65,7 @@ class BeamModel(NoNodalRotations):
         u
             Columns over the dofs of the mesh, (n_mesh_dof, k).
         """
-        self._require_rows("mass_gram", u)
+        require_rows("mass_gram", u, self.n_mesh_dof)
         k = np.shape(u)[1]
         return sum((piece.gram(np.asarray(u)) for piece in self.pieces), start=np.zeros((4 + 3 * k, 4 + 3 * k)))
 
@@ -75,7 +74,7 @@ class BeamModel(NoNodalRotations):
 
         The forces are in local axes, about the centroid, on the face with normal +x.
         """
-        self._require_rows("section_forces", u)
+        require_rows("section_forces", u, self.n_mesh_dof)
         local = self.geometry.T @ np.asarray(u)[self.dofs]
         return end_forces_at_centroid(self.K_local @ local)
 
@@ -118,7 +117,9 @@ class BeamModel(NoNodalRotations):
         y_s, z_s = section.shear_center
         about = np.array(forces)
         about[:, 3] += z_s * about[:, 1] - y_s * about[:, 2]  # torsional moment about the shear centre
-        table = np.einsum("ncs,psf->npcf", _stress_directions(self.geometry.R[lines]), section.stress)
+        table = np.einsum(
+            "ncs,psf->npcf", stress_directions(self.geometry.R[lines], ((0, 0), (0, 1), (0, 2))), section.stress
+        )
         n, n_points = table.shape[:2]
         return np.asarray((table.reshape(n, 6 * n_points, 6) @ about).reshape(n, n_points, 6, -1))
 
@@ -136,7 +137,7 @@ class BeamModel(NoNodalRotations):
 
     def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
         """Return K u of lines and springs, (n_mesh_dof, k) [N, N m], at all nodes."""
-        self._require_rows("internal_forces", u)
+        require_rows("internal_forces", u, self.n_mesh_dof)
         forces = np.zeros(np.shape(u))
         np.add.at(forces, self.dofs, self._node_forces(u))
         for spring in self.springs:
@@ -147,7 +148,7 @@ class BeamModel(NoNodalRotations):
     def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Array) -> Array:
         """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), for states u under these loads, by `elements.beams.geometric`."""
         for columns in (u, Phi):
-            self._require_rows("geometric_stiffness", columns)
+            require_rows("geometric_stiffness", columns, self.n_mesh_dof)
         K = np.zeros((loads.k, Phi.shape[1], Phi.shape[1]))
         if len(self.dofs):
             by_nodes = self._node_forces(u) - slice_forces(self.pieces[0], loads)
@@ -177,19 +178,3 @@ class BeamModel(NoNodalRotations):
         radius2 = np.array([section.J_polar / section.A for section in self.sections])[self.of_line]
         geometry = self.geometry
         return BeamLines(self.pieces[0], xi, weights, geometry.length, geometry.R[:, :, 0], geometry.levers, radius2)
-
-    def _require_rows(self, where: str, u: Array) -> None:
-        if np.ndim(u) != 2 or np.shape(u)[0] != self.n_mesh_dof:
-            raise BodyError(f"{where}: u: expected columns over {self.n_mesh_dof} dofs, got {np.shape(u)}")
-
-
-def _stress_directions(R: Array) -> Array:
-    """Return stress xx yy zz yz xz xy in mesh axes for unit local sigma_xx, tau_xy, tau_xz, (n, 6, 3)."""
-    x, y, z = R[:, :, 0], R[:, :, 1], R[:, :, 2]
-    columns = []
-    for other in (None, y, z):
-        tensor = np.einsum("na,nb->nab", x, x if other is None else other)
-        if other is not None:
-            tensor = tensor + tensor.transpose(0, 2, 1)
-        columns.append(np.stack([tensor[:, a, b] for a, b in ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))], axis=1))
-    return np.stack(columns, axis=2)

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from fe_models.body.fe_body import FEBody, Interface, Recovery
+from fe_models.body.fe_body import FEBody, Interface, Recovery, dofs_of
 from fe_models.body.material import material_words
 from fe_models.body.unit_check import warn_of_materials
 from fe_models.elements.beams.attachments import PointMass, RigidLink, Spring
@@ -95,9 +95,7 @@ def shell_body(
     )
     n_nodes = len(mesh.nodes)
     skin = make_shell_skin(mesh.nodes, groups)
-    node_dofs = np.stack([np.repeat(np.arange(n_nodes), 6), np.tile(np.arange(6), n_nodes)], axis=1)
-    skin_nodes = n_nodes + np.arange(len(skin.points))
-    skin_dofs = np.stack([np.repeat(skin_nodes, 3), np.tile(np.arange(3), len(skin_nodes))], axis=1)
+    node_dofs, skin_dofs = dofs_of(np.arange(n_nodes), 6), dofs_of(n_nodes + np.arange(len(skin.points)), 3)
     model = ShellModel(n_nodes, groups, skin)
     body = FEBody(
         name=name,

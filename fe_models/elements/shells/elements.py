@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from fe_models.elements.beams.axes import stress_directions
 from fe_models.elements.beams.slices import Slices
 from fe_models.elements.shells.laminate import ShellLaw, shell_law
 from fe_models.elements.shells.plates import quad_strains, triangle_strains
@@ -270,7 +271,8 @@ class ShellCells:
             return law.stress(z, law.layer_at(z))
 
         local = self.by_law(at_height, rows)[:, None] @ resultants
-        return np.einsum("nas,npsk->npak", stress_directions(self.planes.R[rows]), local)
+        directions = stress_directions(self.planes.R[rows], ((0, 0), (1, 1), (0, 1), (0, 2), (1, 2)))
+        return np.einsum("nas,npsk->npak", directions, local)
 
 
 def shell_cells(
@@ -349,17 +351,6 @@ def corner_extrapolation(kind: str) -> Array:
         corners = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
         at_points, at_corners = (np.column_stack([np.ones(len(x)), x, x[:, 0] * x[:, 1]]) for x in (points, corners))
     return np.asarray(at_corners @ np.linalg.inv(at_points))
-
-
-def stress_directions(R: Array) -> Array:
-    """Return the map from local sigma_x sigma_y tau_xy tau_xz tau_yz to xx yy zz yz xz xy in mesh axes, (n, 6, 5)."""
-    columns = []
-    for i, j in ((0, 0), (1, 1), (0, 1), (0, 2), (1, 2)):
-        tensor = np.einsum("na,nb->nab", R[:, :, i], R[:, :, j])
-        if i != j:
-            tensor = tensor + tensor.transpose(0, 2, 1)
-        columns.append(np.stack([tensor[:, a, b] for a, b in ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))], axis=1))
-    return np.stack(columns, axis=2)
 
 
 def _times_blocks(B: Array, planes: CellPlanes) -> Array:

@@ -15,8 +15,7 @@ from fe_models.elements.beams.geometric import slice_forces
 from fe_models.elements.shells.elements import ShellCells
 from fe_models.elements.shells.geometric import cell_geometric_stiffness
 from fe_models.elements.shells.skin import ShellSkin
-from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.errors import BodyError
+from fe_models.foundation.arrays import Array, IntArray, require_rows
 from fe_models.foundation.threads import n_threads, one_blas_thread
 
 __all__ = ["ShellModel"]
@@ -51,7 +50,7 @@ class ShellModel(NoNodalRotations):
         u
             Columns over the dofs of the mesh, (n_mesh_dof, k).
         """
-        self._require_rows("mass_gram", u)
+        require_rows("mass_gram", u, self.n_mesh_dof)
         k = np.shape(u)[1]
         gram = np.zeros((4 + 3 * k, 4 + 3 * k))
         for _, part in self._of_chunks(lambda group, rows: group.slices(rows).gram(np.asarray(u))):
@@ -80,7 +79,7 @@ class ShellModel(NoNodalRotations):
             Function of cells, resultants at their corners, rows and a height in the thickness, such as
             `ShellCells.stress`.
         """
-        self._require_rows("nodal_stress", u)
+        require_rows("nodal_stress", u, self.n_mesh_dof)
         u = np.asarray(u)
         n_skin, k = len(self.skin.points), u.shape[1]
         total = np.zeros((self.n_nodes + n_skin, 6 * k))
@@ -107,7 +106,7 @@ class ShellModel(NoNodalRotations):
 
     def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
         """Return K u of all cells, or only of cells at `nodes` if these are given, (n_mesh_dof, k) [N, N m]."""
-        self._require_rows("internal_forces", u)
+        require_rows("internal_forces", u, self.n_mesh_dof)
         forces = np.zeros(np.shape(u))
         for dofs, part in self._of_chunks(lambda group, rows: group.internal_forces(np.asarray(u), rows), nodes):
             np.add.at(forces, dofs, part)
@@ -116,7 +115,7 @@ class ShellModel(NoNodalRotations):
     def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Array) -> Array:
         """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), for states u under these loads, by `elements.shells.geometric`."""
         for columns in (u, Phi):
-            self._require_rows("geometric_stiffness", columns)
+            require_rows("geometric_stiffness", columns, self.n_mesh_dof)
         u, Phi = np.asarray(u), np.asarray(Phi)
         K = np.zeros((loads.k, Phi.shape[1], Phi.shape[1]))
         for _, part in self._of_chunks(lambda group, rows: cell_geometric_stiffness(group, rows, u, loads, Phi)):
@@ -163,7 +162,3 @@ class ShellModel(NoNodalRotations):
             )
             for at, weight in zip(places, weights, strict=True)
         )
-
-    def _require_rows(self, where: str, u: Array) -> None:
-        if np.ndim(u) != 2 or np.shape(u)[0] != self.n_mesh_dof:
-            raise BodyError(f"{where}: u: expected columns over {self.n_mesh_dof} dofs, got {np.shape(u)}")

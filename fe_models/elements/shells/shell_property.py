@@ -5,7 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fe_models.body.material import AnisotropicMaterial, AnyMaterial, Material, OrthotropicMaterial, require_isotropic
+from fe_models.body.material import (
+    AnisotropicMaterial,
+    AnyMaterial,
+    Material,
+    OrthotropicMaterial,
+    groups_of,
+    require_isotropic,
+)
 from fe_models.errors import ShellError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import ArgumentError
@@ -322,14 +329,9 @@ def assign_shell_properties(
     missing = {kind: np.flatnonzero(index < 0) for kind, index in number.items() if (index < 0).any()}
     if missing:
         counts = ", ".join(f"{rows.size} {kind}" for kind, rows in missing.items())
-        groups = [
-            group
-            for group, by_type in mesh.cell_sets.items()
-            if any(np.isin(missing[kind], by_type[kind]).any() for kind in missing if kind in by_type)
-        ]
-        where = f"they are in the groups {', '.join(groups)}: give these one" if groups else "they are in no group"
         raise ShellError(
-            f"shells: cells without a thickness: {counts}; {where}; cells outside the body are left out by  "
+            f"shells: cells without a thickness: {counts}; {groups_of(mesh.cell_sets, missing, 'one')}; cells outside "
+            "the body are left out by  "
             'read_shell_mesh(groups=...) or, in a job, accept = ["left-out"]'
         )
     return used, number

@@ -10,7 +10,7 @@ from fe_models.body.rigid_motion import MassLoads
 from fe_models.elements.beams.model import BeamModel
 from fe_models.elements.shells.model import ShellModel
 from fe_models.elements.shells.section_rotations import SectionRotations
-from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.arrays import Array, IntArray, require_rows
 from fe_models.foundation.errors import BodyError
 from fe_models.meshes.numbering import numbering_side_by_side
 
@@ -94,8 +94,7 @@ class StiffenedModel(NoNodalRotations):
 
     def _parts(self, where: str, u: Array) -> tuple[Array, Array]:
         """Return the rows of u that belong to the shell, and those of the frame."""
-        if np.ndim(u) != 2 or np.shape(u)[0] != self.n_mesh_dof:
-            raise BodyError(f"{where}: u: expected columns over {self.n_mesh_dof} dofs, got {np.shape(u)}")
+        require_rows(where, u, self.n_mesh_dof)
         u = np.asarray(u)
         return u[: self.shell.n_mesh_dof], u[self.shell.n_mesh_dof :]
 

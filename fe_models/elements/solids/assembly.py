@@ -98,6 +98,8 @@ def assemble(
         If there is no solid cell, a cell names a node that does not exist, a node belongs to no solid cell, or an
         element is inverted (Jacobian not positive at a quadrature point).
     """
+    from fe_models.elements.solids.assembly_kernels import expand_columns
+
     kinds = require_assemblable(mesh)
     lists = {kind: np.ascontiguousarray(mesh.cells[kind], dtype=np.int32) for kind in kinds}
     graph = node_graph(list(lists.values()), len(mesh.nodes))
@@ -114,7 +116,10 @@ def assemble(
     )
     row_start = graph.row_start.astype(np.int32) if len(M_data) <= LARGEST_INT32 else graph.row_start
     M_s = sp.csr_array((M_data, graph.columns, row_start), shape=2 * (len(mesh.nodes),))
-    return expanded_stiffness(graph, K_data), M_s
+    index_type = np.int32 if len(K_data) <= LARGEST_INT32 else np.int64
+    indptr, indices = np.zeros(3 * len(graph.row_start) - 2, index_type), np.empty(len(K_data), index_type)
+    in_threads(expand_columns, (graph.row_start, graph.columns), (indptr, indices))
+    return sorted_csc(K_data, indices, indptr), M_s  # rows of K equal its columns
 
 
 def expand_scalar_mass(M_s: sp.csr_array) -> sp.csc_array:
@@ -237,16 +242,6 @@ def kernel_tables(element: ReferenceElement) -> tuple[tuple[np.ndarray, ...], ..
     products = np.einsum("q,qp,qp->p", mass.weights, mass.values[:, a], mass.values[:, b])
     affine = (nodes, on_axes, gradients.reshape(9, -1), products)
     return affine, (stiffness.gradients, stiffness.weights), (mass.values, mass.gradients, mass.weights)
-
-
-def expanded_stiffness(graph: NodeGraph, K_data: Array) -> sp.csc_array:
-    """Return K from its entries, row starts and column numbers; rows equal columns, because K is symmetric."""
-    from fe_models.elements.solids.assembly_kernels import expand_columns
-
-    index_type = np.int32 if len(K_data) <= LARGEST_INT32 else np.int64
-    indptr, indices = np.zeros(3 * len(graph.row_start) - 2, index_type), np.empty(len(K_data), index_type)
-    in_threads(expand_columns, (graph.row_start, graph.columns), (indptr, indices))
-    return sorted_csc(K_data, indices, indptr)
 
 
 def sorted_csc(data: Array, indices: np.ndarray, indptr: np.ndarray) -> sp.csc_array:

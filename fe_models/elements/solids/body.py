@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 import scipy.sparse as sp
 
-from fe_models.body.fe_body import FEBody, Interface
+from fe_models.body.fe_body import FEBody, Interface, dofs_of
 from fe_models.body.material import AnyMaterial, assign_materials, material_words
 from fe_models.body.rigid_motion import MassLoads
 from fe_models.body.unit_check import warn_of_materials
@@ -23,7 +23,7 @@ from fe_models.elements.solids.geometric import (
 )
 from fe_models.elements.solids.incompatible import KIND, brick_chunks, brick_stiffness
 from fe_models.elements.solids.stress import nodal_stress
-from fe_models.foundation.arrays import Array, IntArray, frozen
+from fe_models.foundation.arrays import Array, IntArray, frozen, require_rows
 from fe_models.foundation.errors import BodyError
 from fe_models.foundation.ranks.product import RowsProduct
 from fe_models.foundation.ranks.ranks import Ranks
@@ -285,7 +285,7 @@ def solid_body(
         M=M,
         K=K,
         nodes=mesh.nodes,
-        dofs=np.stack([np.repeat(np.arange(n_nodes), 3), np.tile(np.arange(3), n_nodes)], axis=1),
+        dofs=dofs_of(np.arange(n_nodes), 3),
         interfaces=tuple(interfaces),
         units=units,
         surface=facets_of(mesh).triangles,
@@ -384,9 +384,3 @@ def provenance(
     record["integration of the stiffness"] = rules["integration"] if rules["integration"] != "full" else ""
     record["mass of the cells"] = rules["mass"] if rules["mass"] != "consistent" else ""
     return {key: value for key, value in record.items() if value}
-
-
-def require_rows(where: str, u: Array, n_rows: int) -> None:
-    """Raise `BodyError` unless u is two-dimensional with this number of rows."""
-    if u.ndim != 2 or u.shape[0] != n_rows:
-        raise BodyError(f"{where}: u: expected columns over {n_rows} dofs, got {u.shape}")

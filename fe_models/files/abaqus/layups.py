@@ -10,7 +10,7 @@ from fe_models.files.abaqus.draft import Draft
 from fe_models.files.abaqus.materials import numbers
 from fe_models.files.decks.deck import DeckLayer, ShellSection
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.words import nearest, quoted
+from fe_models.foundation.words import is_number, nearest, quoted
 
 __all__ = ["layers_of_block", "layups_in_axes"]
 
@@ -107,7 +107,7 @@ def _directed(draft: Draft, shell: ShellSection, layers: tuple[DeckLayer, ...]) 
     axes: list[Array] = []
     angles: list[float] = []
     for layer in layers:
-        is_angle = _is_number(layer.orientation)
+        is_angle = is_number(layer.orientation)
         word = shell.orientation if is_angle or not layer.orientation else layer.orientation
         if not word:
             if _is_directed(draft, layer.material):
@@ -142,11 +142,3 @@ def _directed(draft: Draft, shell: ShellSection, layers: tuple[DeckLayer, ...]) 
     laid = tuple(replace(layer, angle=angle, orientation="") for layer, angle in zip(layers, angles, strict=True))
     x, y, z = (float(v) for v in first[0])
     return replace(shell, layers=laid, direction=(x, y, z))
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from fe_models.body.fe_body import FEBody, Interface
+from fe_models.body.fe_body import FEBody, Interface, dofs_of
 from fe_models.body.freedom import RigidForces, rigid_forces
 from fe_models.body.load_cases import LoadCase
 from fe_models.body.rigid_motion import rigid_motion_of_dofs
@@ -141,7 +141,7 @@ def with_geometry(read: ForeignMatrices, geometry: Mesh | NodeCloud) -> ForeignM
                 "so that nobody knows which row is whose; write the matrices with node numbers (Abaqus: "
                 "FORMAT=MATRIX INPUT)"
             )
-        dofs = np.stack([np.repeat(np.arange(1, n_nodes + 1), per_node), np.tile(np.arange(per_node), n_nodes)], axis=1)
+        dofs = dofs_of(np.arange(1, n_nodes + 1), per_node)
         note = f"rows taken as {per_node} to a node in the order of their numbers, as no list of dofs was given"
         read = replace(read, dofs=dofs, notes=(*read.notes, note))
     return read

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from fe_models.body.fe_body import dofs_of
 from fe_models.errors import MatrixError
 from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.errors import ArgumentError
@@ -227,9 +228,7 @@ def with_dofs(parts: list[ForeignMatrices], where: str) -> list[ForeignMatrices]
             n, n_nodes = max(sizes, default=0), len(part.row_nodes)
             if n not in (3 * n_nodes, 6 * n_nodes):
                 raise MatrixError(f"{where}: expected 3 or 6 of {n} rows to each node of the list, got {n_nodes} nodes")
-            k = n // n_nodes
-            dofs = np.stack([np.repeat(part.row_nodes, k), np.tile(np.arange(k), n_nodes)], axis=1)
-            part = replace(part, dofs=dofs, row_nodes=None)
+            part = replace(part, dofs=dofs_of(part.row_nodes, n // n_nodes), row_nodes=None)
         made.append(part)
     return made
 

@@ -26,11 +26,10 @@ from fe_models.body.fe_body import FEBody
 from fe_models.elements.beams.model import BeamModel
 from fe_models.elements.beams.slices import Slices
 from fe_models.foundation.arrays import Array
-from floatframe.components.flexible_parts.flexible_part import FlexiblePart
+from floatframe.components.flexible_parts.flexible_part import FlexiblePart, placement
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
-from floatframe.model.bodies.rigid_body import RigidBody, euler_parameters_from_user
-from floatframe.model.checked_values import array_of_shape
+from floatframe.model.bodies.rigid_body import RigidBody
 from floatframe.model.forces import Bushing
 from floatframe.model.rotations import rotation_matrix, tilde
 
@@ -105,10 +104,7 @@ def exact_beams(
         raise ModelError(f"{where}: body {body.name!r} has rigid links, which exact beams do not support; remove them")
     if pieces < 1 or not 0 <= damping < np.inf:
         raise ModelError(f"{where}: expected pieces from 1 and damping from 0, got {pieces} and {damping:g}")
-    origin = array_of_shape(f"{where}: position", np.zeros(3) if position is None else position, (3,))
-    p = euler_parameters_from_user(f"{where}: orientation", np.eye(4)[0] if orientation is None else orientation)
-    v = array_of_shape(f"{where}: velocity", np.zeros(3) if velocity is None else velocity, (3,))
-    omega = array_of_shape(f"{where}: omega_B", np.zeros(3) if omega_B is None else omega_B, (3,))
+    origin, p, v, omega = placement(where, position, orientation, velocity, omega_B)
 
     geometry, of_nodes = model.geometry, model.dofs[:, [0, 6]] // 6
     called = [f"{name} {body.numbering.called(node)}" for node in range(model.n_nodes)]

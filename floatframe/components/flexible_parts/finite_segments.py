@@ -7,12 +7,11 @@ import numpy as np
 from cms.body.reduced_body import ReducedBody
 from fe_models.body.beam_line import BeamLine
 from fe_models.foundation.arrays import Array
-from floatframe.components.flexible_parts.flexible_part import FlexiblePart
+from floatframe.components.flexible_parts.flexible_part import FlexiblePart, placement
 from floatframe.errors import ModelError
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.bodies.markers import Marker
-from floatframe.model.bodies.rigid_body import RigidBody, euler_parameters_from_user
-from floatframe.model.checked_values import array_of_shape
+from floatframe.model.bodies.rigid_body import RigidBody
 from floatframe.model.forces import Bushing
 from floatframe.model.joints import FixedJoint, Joint
 from floatframe.model.rotations import rotation_matrix
@@ -70,10 +69,7 @@ def floating_parts(
     where = f"floating_parts {name!r}"
     if not reduced:
         raise ModelError(f"{where}: expected a reduced body or several, got none")
-    r = array_of_shape(f"{where}: position", np.zeros(3) if position is None else position, (3,))
-    p = euler_parameters_from_user(f"{where}: orientation", np.eye(4)[0] if orientation is None else orientation)
-    v = array_of_shape(f"{where}: velocity", np.zeros(3) if velocity is None else velocity, (3,))
-    omega = array_of_shape(f"{where}: omega_B", np.zeros(3) if omega_B is None else omega_B, (3,))
+    r, p, v, omega = placement(where, position, orientation, velocity, omega_B)
     R, origin, last = rotation_matrix(p), r, np.zeros(3)
     bodies: list[FlexibleBody] = []
     joints: list[Joint] = []
@@ -161,10 +157,7 @@ def finite_segments(
         raise ModelError(f"{where}: n: expected at least 2 segments, got {n}")
     if not 0 <= damping < np.inf:
         raise ModelError(f"{where}: damping: expected zero or more, got {damping:g}")
-    origin = array_of_shape(f"{where}: position", np.zeros(3) if position is None else position, (3,))
-    p = euler_parameters_from_user(f"{where}: orientation", np.eye(4)[0] if orientation is None else orientation)
-    v = array_of_shape(f"{where}: velocity", np.zeros(3) if velocity is None else velocity, (3,))
-    omega = array_of_shape(f"{where}: omega_B", np.zeros(3) if omega_B is None else omega_B, (3,))
+    origin, p, v, omega = placement(where, position, orientation, velocity, omega_B)
     R = rotation_matrix(p)
     h = line.length / (n - 1)
     nodes = np.linspace(0.0, line.length, n)
@@ -197,9 +190,9 @@ def finite_segments(
     return FlexiblePart(name, tuple(bodies), (), tuple(springs), markers)
 
 
-def between(line: BeamLine, start: float, end: float) -> tuple[Array, Array]:
-    """Return Gauss points and weights from start to end, exact for a polynomial law times x²."""
-    xi, weight = np.polynomial.legendre.leggauss(line.degree // 2 + 2)
+def between(line: BeamLine, start: float, end: float, n: int) -> tuple[Array, Array]:
+    """Return n Gauss points between two breaks and their weights, from start to end."""
+    xi, weight = np.polynomial.legendre.leggauss(n)
     cuts = np.array([start, *(x for x in line.breaks if start < x < end), end])
     half, middle = np.diff(cuts)[:, None] / 2, (cuts[1:] + cuts[:-1])[:, None] / 2
     return (middle + half * xi).ravel(), (half * weight).ravel()
@@ -207,7 +200,7 @@ def between(line: BeamLine, start: float, end: float) -> tuple[Array, Array]:
 
 def segment(where: str, line: BeamLine, start: float, end: float) -> tuple[float, float, Array]:
     """Return mass, x of the centre of mass, and inertia about it, of the beam from start to end."""
-    x, weight = between(line, start, end)
+    x, weight = between(line, start, end, line.degree // 2 + 2)  # exact for a polynomial law times x²
     mass = weight * line.at("rho_A", x)
     Iy, Iz = (float(weight @ line.at(law, x)) for law in ("rho_Iy", "rho_Iz"))
     if not Iy + Iz > 0:
@@ -223,11 +216,7 @@ def segment(where: str, line: BeamLine, start: float, end: float) -> tuple[float
 
 def element_stiffness(line: BeamLine, start: float, end: float) -> Array:
     """Return the stiffness between the halves of a beam piece for relative motion at mid-length, (6, 6): (2)."""
-    # for the inverse of a law, which is not a polynomial
-    xi, weight = np.polynomial.legendre.leggauss(max(8, line.degree + 2))
-    cuts = np.array([start, *(x for x in line.breaks if start < x < end), end])
-    half, middle = np.diff(cuts)[:, None] / 2, (cuts[1:] + cuts[:-1])[:, None] / 2
-    x, weight = (middle + half * xi).ravel(), (half * weight).ravel()
+    x, weight = between(line, start, end, max(8, line.degree + 2))  # the inverse of a law is not a polynomial
     laws = np.array([line.at(law, x) for law in ("EA", "GAy", "GAz", "GJ", "EIy", "EIz")])
     arm = (start + end) / 2 - x
     B = np.tile(np.eye(6), (len(x), 1, 1))

@@ -4,17 +4,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
+from floatframe.model.bodies.rigid_body import euler_parameters_from_user
+from floatframe.model.checked_values import array_of_shape
 from floatframe.model.forces import Force
 from floatframe.model.joints import Joint
 from floatframe.model.system import Body
 
-__all__ = ["FlexiblePart", "PartMaker"]
+__all__ = ["FlexiblePart", "PartMaker", "placement"]
 
 
 @presented
@@ -55,3 +59,15 @@ class PartMaker(Protocol):
 
     def __call__(self, name: str, *, position: Array, orientation: Array) -> FlexiblePart:
         """Return the part with its origin at a position, (3,), rotated by Euler parameters, (4,)."""
+
+
+def placement(
+    where: str, position: Array | None, orientation: Array | None, velocity: Array | None, omega_B: Array | None
+) -> tuple[Array, Array, Array, Array]:
+    """Return position, (3,), Euler parameters, (4,), velocity and angular velocity, (3,), of a part; None: at rest."""
+    return (
+        array_of_shape(f"{where}: position", np.zeros(3) if position is None else position, (3,)),
+        euler_parameters_from_user(f"{where}: orientation", np.eye(4)[0] if orientation is None else orientation),
+        array_of_shape(f"{where}: velocity", np.zeros(3) if velocity is None else velocity, (3,)),
+        array_of_shape(f"{where}: omega_B", np.zeros(3) if omega_B is None else omega_B, (3,)),
+    )

@@ -9,9 +9,10 @@ import numpy as np
 from numba.extending import register_jitable
 
 from floatframe.components.wheels.roads.surface import CENTRE, road_grip, road_height
+from floatframe.model.elements.pairs import inner_product, vector_product
 
 __all__ = ["AXIS", "CENTRE_AT", "COMMON", "DAMPING", "LOW_SPEED", "RADIUS", "ROAD", "SETTLING", "SIGMA_X", "SIGMA_Y"]
-__all__ += ["STIFFNESS", "TURN_AT", "contact", "cross", "dot", "grip_at", "moved", "normal_force", "put_wrenches"]
+__all__ += ["STIFFNESS", "TURN_AT", "contact", "grip_at", "moved", "normal_force", "put_wrenches"]
 __all__ += ["touching"]
 
 # indices of the parameters that all tyres have; the parameters of each law begin at `COMMON`
@@ -22,18 +23,6 @@ ROAD, COMMON = 23, 24  #: index of the first parameter of the road; index of the
 
 #: number of iterations for the contact point on uneven roads; each reduces the error by radius times curvature
 FEET = 4
-
-
-@register_jitable(error_model="numpy")
-def dot(a, b):
-    """Return a · b."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@register_jitable(error_model="numpy")
-def cross(a, b):
-    """Return a × b."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @register_jitable(error_model="numpy")
@@ -103,30 +92,45 @@ def contact(x, data):
             h = R_0 - (R_0 + height - c[2]) / length
         else:
             h = (c[0] - foot_x) * n[0] + (c[1] - foot_y) * n[1] + (c[2] - height) * n[2]
-        sine = dot(e_road, n)  # (2)
+        sine = inner_product(e_road, n)  # (2)
         cosine = np.sqrt(1.0 - sine * sine + 1e-24)
-        ahead = cross(e_road, n)
+        ahead = vector_product(e_road, n)
         x_road = ahead[0] / cosine, ahead[1] / cosine, ahead[2] / cosine
-        up = cross(x_road, e_road)
+        up = vector_product(x_road, e_road)
         rho = h / cosine
         foot_x, foot_y = c[0] - rho * up[0], c[1] - rho * up[1]
     x_W, normal, u = rotated_vector(x, 0, x_road), rotated_vector(x, 0, n), rotated_vector(x, 0, up)
-    y_W = cross(normal, x_W)
+    y_W = vector_product(normal, x_W)
     point = x[1, 0] - rho * u[0], x[1, 1] - rho * u[1], x[1, 2] - rho * u[2]
     arm = -rho * u[0], -rho * u[1], -rho * u[2]  # (3)
     omega_a = x[0, 15], x[0, 16], x[0, 17]
     omega_b = x[1, 15], x[1, 16], x[1, 17]
     relative = along(1.0, omega_b, -1.0, omega_a)
-    Omega = dot(relative, e)
-    road = cross(omega_a, (point[0] - x[0, 0], point[1] - x[0, 1], point[2] - x[0, 2]))
-    rim = cross(along(1.0, omega_b, -Omega, e), arm)
+    Omega = inner_product(relative, e)
+    road = vector_product(omega_a, (point[0] - x[0, 0], point[1] - x[0, 1], point[2] - x[0, 2]))
+    rim = vector_product(along(1.0, omega_b, -Omega, e), arm)
     V = (
         x[1, 12] + rim[0] - x[0, 12] - road[0],
         x[1, 13] + rim[1] - x[0, 13] - road[1],
         x[1, 14] + rim[2] - x[0, 14] - road[2],
     )
-    rate = -dot(V, normal) / cosine
-    return x_W, y_W, normal, e, point, R_0 - rho, rho, sine, cosine, dot(V, x_W), dot(V, y_W), Omega, rate, left
+    rate = -inner_product(V, normal) / cosine
+    return (
+        x_W,
+        y_W,
+        normal,
+        e,
+        point,
+        R_0 - rho,
+        rho,
+        sine,
+        cosine,
+        inner_product(V, x_W),
+        inner_product(V, y_W),
+        Omega,
+        rate,
+        left,
+    )
 
 
 @register_jitable(error_model="numpy")
@@ -153,8 +157,8 @@ def moved(x, data):
     for k in range(3):  # assembled axes (columns), and the present axes
         old = data[TURN_AT + k], data[TURN_AT + 3 + k], data[TURN_AT + 6 + k]
         new = turned_back(x, 0, (x[1, 3 + k], x[1, 6 + k], x[1, 9 + k]))
-        half = cross(old, new)
-        turn += 0.5 * dot(half, e)
+        half = vector_product(old, new)
+        turn += 0.5 * inner_product(half, e)
         lean += 0.5 * (half[0] * ahead[0] + half[1] * ahead[1])
     return gone[0] * ahead[0] + gone[1] * ahead[1], -gone[0] * ahead[1] + gone[1] * ahead[0], turn, lean
 
@@ -217,7 +221,7 @@ def put_wrenches(x, wrench, frame, F, M):
     for m in range(2):
         sign = 1.0 if m == 1 else -1.0
         arm = point[0] - x[m, 0], point[1] - x[m, 1], point[2] - x[m, 2]
-        turning = cross(arm, force)
+        turning = vector_product(arm, force)
         for k in range(3):
             wrench[m, k] = sign * force[k]
             wrench[m, 3 + k] = sign * (moment[k] + turning[k])

@@ -8,7 +8,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from floatframe.components.wheels.contact import COMMON
-from floatframe.components.wheels.slip import magnitude, square
+from floatframe.model.elements.smooth import absolute, square
 
 __all__ = ["COEFFICIENTS_AT", "IS_61", "PRESSURE", "forces_and_moments", "peaks_and_stiffnesses"]
 
@@ -86,7 +86,7 @@ def peaks_and_stiffnesses(p, F_z, c, grip):
     mu_y = mu_y * p[LMUY] * grip
     K_x = F_z * (p[PKX1] + p[PKX2] * df) * np.exp(p[PKX3] * df) * (1.0 + p[PPX1] * dp + p[PPX2] * dp * dp) * p[LKX]
     at_peak = (p[PKY2] + p[PKY5] * c_y * c_y) * (1.0 + p[PPY2] * dp)
-    K_y = p[PKY1] * F_0 * (1.0 + p[PPY1] * dp) * (1.0 - p[PKY3] * magnitude(c_y))
+    K_y = p[PKY1] * F_0 * (1.0 + p[PPY1] * dp) * (1.0 - p[PKY3] * absolute(c_y))
     K_y = K_y * np.sin(p[PKY4] * np.arctan(F_z / (F_0 * at_peak))) * p[LKY]
     return df, mu_x, K_x, mu_y, K_y
 
@@ -167,7 +167,7 @@ def forces_and_moments(p, F_z, kappa, alpha, gamma, R_0, V_x, forward, rolling, 
         F_y, F_y_trail = G * F_y0 + S_Vyk, G * F_y_trail
     # aligning moment
     c_z = c if is_61 else p[LGAZ] * c
-    size = magnitude(c_z)
+    size = absolute(c_z)
     S_Ht = rolling * (p[QHZ1] + p[QHZ2] * df + (p[QHZ3] + p[QHZ4] * df) * c_z)
     a_t = s + S_Ht
     a_r = s + S_Hy + S_Vy / (K_y + sign_of(K_y) * TINY * F_0)
@@ -201,7 +201,7 @@ def forces_and_moments(p, F_z, kappa, alpha, gamma, R_0, V_x, forward, rolling, 
     tilt = tilt + p[QSX10] * np.arctan(p[QSX11] * f) * gamma
     M_x = R_0 * F_z * tilt * p[LMX]
     v = V_x / p[SPEED]
-    resistance = p[QSY1] + p[QSY2] * F_x / p[LOAD] + p[QSY3] * magnitude(v) + p[QSY4] * square(square(v))
+    resistance = p[QSY1] + p[QSY2] * F_x / p[LOAD] + p[QSY3] * absolute(v) + p[QSY4] * square(square(v))
     resistance = resistance + (p[QSY5] + p[QSY6] * f) * gamma * gamma
     loaded = f
     if is_61:

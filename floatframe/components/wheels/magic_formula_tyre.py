@@ -74,13 +74,14 @@ from floatframe.components.wheels.numbers import tyre_law, tyre_numbers
 from floatframe.components.wheels.outputs import show, show_energy
 from floatframe.components.wheels.reading import Read, properties_of_table, tyre_of_table
 from floatframe.components.wheels.roads.road import FlatRoad, Road
-from floatframe.components.wheels.slip import direction, hold_tread, magnitude, tread_slip
+from floatframe.components.wheels.slip import direction, hold_tread, tread_slip
 from floatframe.components.wheels.tyre_fields import check_road, landing_depth
 from floatframe.components.wheels.tyre_file import TyreProperties
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.checked_values import number, unit_vector
 from floatframe.model.elements import Element, ElementLaw, Placed
+from floatframe.model.elements.smooth import absolute
 from floatframe.model.shapes import Arrow, MarkerShapes
 
 __all__ = ["MagicFormulaTyre", "magic_formula_law", "magic_formula_law_at_rest"]
@@ -116,13 +117,13 @@ def relaxation(data, df, load, K_x, K_y, gamma):
         x = load * (data[PTX1] + data[PTX2] * df) * np.exp(-data[PTX3] * df) * R_0 / F_0 * data[LSGKP]
     else:
         stiffness = data[C_LONG] * (1.0 + data[PCFX1] * df + data[PCFX2] * df * df) * (1.0 + data[PCFX3] * dp)
-        x = magnitude(K_x) / stiffness
+        x = absolute(K_x) / stiffness
     if data[PTY1] != 0.0:
         y = data[PTY1] * np.sin(2.0 * np.arctan(load / (data[PTY2] * F_0 * data[LFZO])))
-        y = y * (1.0 - data[PKY3] * magnitude(gamma)) * R_0 * data[LFZO] * data[LSGAL]
+        y = y * (1.0 - data[PKY3] * absolute(gamma)) * R_0 * data[LFZO] * data[LSGAL]
     else:
         stiffness = data[C_LAT] * (1.0 + data[PCFY1] * df + data[PCFY2] * df * df) * (1.0 + data[PCFY3] * dp)
-        y = magnitude(K_y) / stiffness
+        y = absolute(K_y) / stiffness
     least = SHORTEST * R_0
     return x if x.real > least else least + 0.0 * x, y if y.real > least else least + 0.0 * y
 
@@ -146,7 +147,7 @@ def magic_formula_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     d = d + R_free - R_0
     is_down = d.real > 0.0
     landed = touching(data, d)
-    stiffening = 1.0 + data[QV2] * magnitude(spin)
+    stiffening = 1.0 + data[QV2] * absolute(spin)
     q = d / R_0
     spring = (1.0 + data[PFZ1] * data[DP]) * (data[QFZ1] * q + data[QFZ2] * q * q) * F_0  # (2)
     F_z = normal_force(data, d, landed, rate, cosine, stiffening * spring)
@@ -163,7 +164,7 @@ def magic_formula_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     grip = grip_at(x, data, point)
     df, mu_x, K_x, mu_y, K_y = peaks_and_stiffnesses(data, load, side * c, grip)
     sigma = relaxation(data, df, load, K_x, K_y, gamma)
-    scale = 3.0 * mu_x * load / magnitude(K_x), 3.0 * mu_y * load / magnitude(K_y)
+    scale = 3.0 * mu_x * load / absolute(K_x), 3.0 * mu_y * load / absolute(K_y)
     kappa, tangent = tread_slip(data, sigma, scale, z, z_dot, V_x, V_sx, V_y, landed)
     kappa_held, over = held(kappa, data[KAPPA_LOW], data[KAPPA_HIGH])
     clamped += over
@@ -174,7 +175,7 @@ def magic_formula_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     if F_z.real > 0.0:
         forward = direction(V_x, data[LOW_SPEED])
         F_x, F_y, M_x, M_y, M_z = forces_and_moments(
-            data, load, kappa_held, side * alpha_held, side * gamma, R_0, V_x, forward, magnitude(forward), grip
+            data, load, kappa_held, side * alpha_held, side * gamma, R_0, V_x, forward, absolute(forward), grip
         )
         turning = direction(R_0 * Omega, data[LOW_SPEED])
         F = share * F_x, sign * side * share * F_y, F_z

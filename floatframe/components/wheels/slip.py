@@ -17,23 +17,12 @@ import numpy as np
 from numba.extending import register_jitable
 
 from floatframe.components.wheels.contact import LOW_SPEED, RADIUS, SETTLING, SIGMA_X, SIGMA_Y, moved
+from floatframe.model.elements.smooth import absolute, square
 
-__all__ = ["direction", "hold_tread", "magnitude", "square", "tread_slip"]
+__all__ = ["direction", "hold_tread", "tread_slip"]
 
 LEAST_SLIP = 1e-4  #: smallest slip at which a tyre slides, which keeps the power loss of a lightly loaded tyre finite
 AIR = 20.0  #: factor in the rate (V + AIR V_low)/sigma at which a lifted tread relaxes
-
-
-@register_jitable(error_model="numpy")
-def magnitude(a):
-    """Return |a| by the real part; the imaginary part of a complex step keeps its sign relative to the real part."""
-    return a if a.real >= 0.0 else -a
-
-
-@register_jitable(error_model="numpy")
-def square(a):
-    """Return a². The compiled power of a complex number loses a small imaginary part if the real part is negative."""
-    return a * a
 
 
 @register_jitable(error_model="numpy")
@@ -73,7 +62,7 @@ def tread_slip(data, sigma, scale, z, z_dot, transport, V_sx, V_sy, landed):
     kappa, tan_alpha
     """
     V_low, tau = data[LOW_SPEED], data[SETTLING]
-    V = magnitude(transport)
+    V = absolute(transport)
     if V.real >= V_low:
         fade = 0.0 * V
         rolling = V

@@ -116,7 +116,7 @@ def moved(group: Configurations, compiled: CompiledSystem, point: Point, change:
     state = replace(point.state, u=point.state.u + du)
     if dx.any():
         x = group.retract(vector_of(group, compiled, point.state), dx)
-        state = state_of(group, compiled, group.normalized(x), state.u)
+        state = group.state(group.normalized(x), state.u)
     return Point(point.t, state, point.u_dot + da, point.w + dw, point.w_start, point.angle)
 
 
@@ -126,16 +126,6 @@ def vector_of(group: Configurations, compiled: CompiledSystem, state: State) -> 
     return np.concatenate(
         [part for i in range(len(state.r)) for part in (state.r[i], state.p[i], state.q[q0[i] : q0[i + 1]])]
     )
-
-
-def state_of(group: Configurations, compiled: CompiledSystem, x: Array, u: Array) -> State:
-    """Return the state of the engine for x and u."""
-    r, p, q = [], [], [np.zeros(0)]
-    for j, _, n in group.parts():
-        r.append(x[j : j + 3])
-        p.append(x[j + 3 : j + 7])
-        q.append(x[j + 7 : j + 7 + n])
-    return State(np.array(r), np.array(p), np.concatenate(q), u)
 
 
 def weights_of(take: Take, values: Array) -> tuple[float, Array]:

@@ -103,14 +103,9 @@ def silent_directions(form: LinearForm) -> Array:
         If the tree has a screw joint, for which there is no rule, or terms that hide each other.
     """
     system = form.system
-    tree = rigid_tree(system, f"system {system.name!r}: rules of base parameters").tree
+    tree, moves, to_ground = placed_moves(form)
     n_c, n_b = len(tree.side), len(tree.parent)
-    zero = np.zeros((1, n_c))
-    placed = tree_samples(system, as_placed(system)[None], zero, zero)
-    size = compiled_system(system).length
-    moves = [moves_of(form, placed, tree, i, size) for i in range(n_b)]
     gravity = gravity_of(system)
-    to_ground = [parameters_in(placed.r[0, i] / size, placed.R[0, i]) for i in range(n_b)]
     found: list[Array] = []
 
     def note(i: int, phi: Array, parent: int = -1, drive: int = -1) -> None:
@@ -145,6 +140,17 @@ def silent_directions(form: LinearForm) -> Array:
         return np.zeros((len(form.names), 0))
     U, s, _ = la.svd(np.array(found).T, full_matrices=False)
     return typical_parameters(form)[:, None] * U[:, s > 1e-9 * s[0]]
+
+
+def placed_moves(form: LinearForm) -> tuple[Tree, list[list[Move]], list[Array]]:
+    """Return the tree, the moves of the joint of each body as placed, and the transfers of parameters to the ground."""
+    system = form.system
+    tree = rigid_tree(system, f"system {system.name!r}: rules of base parameters").tree
+    zero = np.zeros((1, len(tree.side)))
+    placed = tree_samples(system, as_placed(system)[None], zero, zero)
+    size, bodies = compiled_system(system).length, range(len(tree.parent))
+    moves = [moves_of(form, placed, tree, i, size) for i in bodies]
+    return tree, moves, [parameters_in(placed.r[0, i] / size, placed.R[0, i]) for i in bodies]
 
 
 def moves_of(form: LinearForm, placed: TreeSamples, tree: Tree, i: int, size: float) -> list[Move]:
@@ -342,13 +348,8 @@ def silent_at_base(form: LinearForm) -> Array:
         If the tree has a screw joint, for which there is no rule.
     """
     system = form.system
-    tree = rigid_tree(system, f"system {system.name!r}: rules of base parameters").tree
-    n_c, n_b, p = len(tree.side), len(tree.parent), len(form.names)
-    zero = np.zeros((1, n_c))
-    placed = tree_samples(system, as_placed(system)[None], zero, zero)
-    size = compiled_system(system).length
-    moves = [moves_of(form, placed, tree, i, size) for i in range(n_b)]
-    to_ground = [parameters_in(placed.r[0, i] / size, placed.R[0, i]) for i in range(n_b)]
+    tree, moves, to_ground = placed_moves(form)
+    n_b, p = len(tree.parent), len(form.names)
     found: list[Array] = []  # parameters of all bodies, in ground axes about its origin, without momentum
     for i in range(n_b):
         parent = int(tree.parent[i])

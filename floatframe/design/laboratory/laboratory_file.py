@@ -15,15 +15,11 @@ from floatframe.design.laboratory.full_model import MOST_DOFS, FullModel
 from floatframe.design.laboratory.laboratory import CaseResult, LaboratoryResult, Reference, study
 from floatframe.errors import ModelError
 from floatframe.files.signals.read_signals import read_signals
+from floatframe.files.system_file.keys import tuple_of_list
 from floatframe.files.system_file.read_system import read_system
 from floatframe.files.system_file.run_section import required_run
 
 __all__ = ["LaboratoryFile", "read_laboratory", "run_laboratory"]
-
-
-def as_tuple(value: Any) -> Any:
-    """Return a list as a tuple."""
-    return tuple(value) if isinstance(value, list) else value
 
 
 def counts(value: Any) -> Any:
@@ -33,10 +29,10 @@ def counts(value: Any) -> Any:
             return mode_counts(value)
         except Exception as error:
             raise ValueError(str(error)) from error
-    return (value,) if isinstance(value, int) else as_tuple(value)
+    return (value,) if isinstance(value, int) else tuple_of_list(value)
 
 
-Words = Annotated[tuple[str, ...], BeforeValidator(as_tuple), Field(min_length=1)]
+Words = Annotated[tuple[str, ...], BeforeValidator(tuple_of_list), Field(min_length=1)]
 
 
 class VaryTable(Table):
@@ -47,10 +43,10 @@ class VaryTable(Table):
         (10,), description='a list of numbers of modes, or words such as "2:12:2"'
     )
     frames: Words = Field(("tisserand",), description='a list of "tisserand", "buckens", "nodal:INTERFACE"')
-    stiffening: Annotated[tuple[bool, ...], BeforeValidator(as_tuple), Field(min_length=1)] = Field(
+    stiffening: Annotated[tuple[bool, ...], BeforeValidator(tuple_of_list), Field(min_length=1)] = Field(
         (True,), description="a list of true and false"
     )
-    parts: Annotated[tuple[int, ...], BeforeValidator(as_tuple), Field(min_length=1)] = Field(
+    parts: Annotated[tuple[int, ...], BeforeValidator(tuple_of_list), Field(min_length=1)] = Field(
         (1,), description="a list of whole numbers from 1"
     )
 
@@ -101,7 +97,7 @@ class LaboratoryFile(Table):
     system: PathBeside = Field(description="the path of a system file with [run] and sensors")
     body: str = Field(description="the name of its flexible body")
     job: PathBeside = Field(description="the path of the job that reduces this body")
-    sensors: Annotated[tuple[str, ...], BeforeValidator(as_tuple)] | None = Field(
+    sensors: Annotated[tuple[str, ...], BeforeValidator(tuple_of_list)] | None = Field(
         None, description="a list of names of sensors; default: all"
     )
     cut: str = Field("rigid", description='"rigid" or "distributing", the interfaces at the cuts of parts')

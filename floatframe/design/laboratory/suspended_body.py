@@ -25,8 +25,8 @@ from cms.reduction.basis.damping import RayleighDamping
 from fe_models.body.fe_body import FEBody
 from fe_models.body.load_cases import LoadCase
 from fe_models.body.rigid_motion import rigid_motion_of_dofs
-from fe_models.foundation.arrays import Array, IntArray
-from floatframe.design.laboratory.full_transient import full_transient, spin_columns
+from fe_models.foundation.arrays import Array
+from floatframe.design.laboratory.full_transient import boundary_dofs, full_transient, spin_columns
 from floatframe.design.laboratory.substitution import with_body
 from floatframe.engine.compiling.placing import placed_bodies
 from floatframe.errors import ModelError
@@ -188,7 +188,7 @@ def _link(where: str, system: System, body: FEBody, name: str, free: Sequence[st
             if marker is None or marker.interface is None:
                 raise ModelError(f"{where}: bushing {force.name!r}: expected an interface of the body as its marker")
             interface = marker.interface
-            B[:, _boundary(body, interface)] = sign * np.eye(6)
+            B[:, boundary_dofs(body, interface)] = sign * np.eye(6)
         elif owner in free:
             x, y, z = point - _placed(where, system, owner)
             arm = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])  # theta × arm
@@ -217,12 +217,6 @@ def _point(where: str, system: System, body: FEBody, owner: str, marker: Marker 
     return np.asarray(position) + (0.0 if owner == GROUND.name else _placed(where, system, owner))
 
 
-def _boundary(body: FEBody, interface: str) -> IntArray:
-    dofs = body.interface(interface).dofs
-    assert dofs is not None  # the body is coupled
-    return dofs
-
-
 def _loads(
     body: FEBody, flexible: FlexibleBody, name: str, rigid: Trajectory, links: Sequence[_Link]
 ) -> tuple[Array, Array, float]:
@@ -238,7 +232,7 @@ def _loads(
     for link in links:
         if link.interface:
             unit = np.zeros((body.n_dof, 6))
-            unit[_boundary(body, link.interface)] = np.eye(6)
+            unit[boundary_dofs(body, link.interface)] = np.eye(6)
             columns.append(unit)
             amplitudes.append(_wrench(flexible, name, rigid, link))
     resultants = [column.T @ Psi for column in columns]

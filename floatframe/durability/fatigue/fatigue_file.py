@@ -26,6 +26,7 @@ from floatframe.durability.fatigue.mean_stress import MEAN_STRESS
 from floatframe.durability.fatigue.sn_curve import BELOW, normal_quantile
 from floatframe.durability.fatigue.spectral.spectral_methods import SPECTRAL_METHODS
 from floatframe.errors import FatigueError
+from floatframe.files.system_file.keys import tuple_of_list
 
 __all__ = [
     "FACTOR_METHODS",
@@ -227,15 +228,8 @@ PLACES = {
 
 Positive = Annotated[float, Field(gt=0)]
 Share = Annotated[float, Field(ge=0, lt=1)]
-
-
-def numbers(value: Any) -> Any:
-    """Return a list of the file as a tuple of numbers."""
-    return tuple(value) if isinstance(value, list) else value
-
-
 InputFile = Annotated[Path, BeforeValidator(existing_file())]
-Numbers = Annotated[tuple[float, ...], BeforeValidator(numbers)]
+Numbers = Annotated[tuple[float, ...], BeforeValidator(tuple_of_list)]
 
 
 class CurveSection(Table):

@@ -18,7 +18,7 @@ K_r (6 n²).
 """
 
 from floatframe.engine.kernels.compiler.compilation import loops, small, view
-from floatframe.engine.kernels.dense import add_products, part_of
+from floatframe.engine.kernels.dense import add_products, slice_of
 from floatframe.engine.kernels.model import C1, C2, C3, C4, DAMPING, K_ROTATION, K_TRANSLATION, MASS, S_AB, STIFFNESS
 from floatframe.engine.kernels.vector import (
     add,
@@ -228,7 +228,7 @@ def modal_forces(model, work, i, a):
     t, n, q0, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i] + 6
     q, q_dot, q_ddot = work.state.q[q0 : q0 + n], work.state.u[u0 : u0 + n], work.state.u_dot[u0 : u0 + n]
     omega, alpha = vector(work.state.u[u0 - 3 :]), vector(work.state.u_dot[u0 - 3 :])
-    W, Y, first = part_of(bodies.W, 9, q0, n), part_of(bodies.Y, 3, q0, n), part_of(bodies.C1, 3, q0, n)
+    W, Y, first = slice_of(bodies.W, 9, q0, n), slice_of(bodies.Y, 3, q0, n), slice_of(bodies.C1, 3, q0, n)
     constant_products(types, t, S_AB, q, W)
     constant_products(types, t, C4, q_dot, Y)
     second, third, h = block(types, t, C2, 3 * n), block(types, t, C3, 9 * n), bodies.residual[u0 : u0 + n]
@@ -253,8 +253,8 @@ def modal_forces(model, work, i, a):
     f = add(column_sum(first, n, q_ddot), cross(scaled(2.0, omega), column_sum(first, n, q_dot)))
     tau = add(tau, scaled(2.0, turned(D_q_dot, omega)))
     if types.is_stiffened[t]:
-        f = add(f, column_sum(part_of(bodies.K_t_q_dot, 3, q0, n), n, q_dot))
-        tau = add(tau, column_sum(part_of(bodies.K_r_q_dot, 3, q0, n), n, q_dot))
+        f = add(f, column_sum(slice_of(bodies.K_t_q_dot, 3, q0, n), n, q_dot))
+        tau = add(tau, column_sum(slice_of(bodies.K_r_q_dot, 3, q0, n), n, q_dot))
     return f, tau
 
 
@@ -267,11 +267,11 @@ def body_mass_product(model, work, i, v, out):
     types, bodies = model.body_types, work.bodies
     t, n, q0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i]
     s, v_O, omega, q_dot = vector(bodies.s[i]), vector(v), vector(v[3:]), v[6:]
-    first = part_of(bodies.C1, 3, q0, n)
+    first = slice_of(bodies.C1, 3, q0, n)
     put(out, 0, add(scaled(types.mass[t], v_O), add(cross(omega, s), column_sum(first, n, q_dot))))
     put(out, 3, add(cross(s, v_O), turned(bodies.J[i], omega)))
     if n > 0:
-        W, second = part_of(bodies.W, 9, q0, n), block(types, t, C2, 3 * n)
+        W, second = slice_of(bodies.W, 9, q0, n), block(types, t, C2, 3 * n)
         for k in range(n):
             B_k = coupling(second, W, n, k)
             put_sum(out, 3, scaled(q_dot[k], B_k))
@@ -301,7 +301,7 @@ def body_tangent(model, work, i, c_m, c_d, c_k, H, turn):
     bodies, n, q0, u0 = work.bodies, model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
     m, a, s, J = model.body_types.mass[model.bodies.kind[i]], vector(bodies.a_B[i]), vector(bodies.s[i]), bodies.J[i]
     omega, q_dot = vector(work.state.u[u0 + 3 :]), work.state.u[u0 + 6 : u0 + 6 + n]
-    v, gyro = column_sum(part_of(bodies.C1, 3, q0, n), n, q_dot), gyroscopic(omega, J, matrix(bodies.D_q_dot[i]))
+    v, gyro = column_sum(slice_of(bodies.C1, 3, q0, n), n, q_dot), gyroscopic(omega, J, matrix(bodies.D_q_dot[i]))
     spin = matrix_sum(tilde(add(scaled(2.0, v), cross(omega, s))), product(tilde(omega), tilde(s)))
     H[:, :] = 0.0
     turn[:, :] = 0.0
@@ -331,7 +331,7 @@ def spin_columns(model, work, i, c_d, H):
     for r in range(3):
         put_sum(H[r], 3, cross(turn, cross(s, unit(r))))
         put_sum(H[3 + r], 3, cross(turn, vector(bodies.J[i, r])))
-    W, second = part_of(bodies.W, 9, q0, n), block(types, t, C2, 3 * n)
+    W, second = slice_of(bodies.W, 9, q0, n), block(types, t, C2, 3 * n)
     for k in range(n):
         put_sum(H[6 + k], 3, cross(turn, coupling(second, W, n, k)))
 
@@ -345,7 +345,7 @@ def modal_tangent(model, work, i, c_m, c_d, c_k, H, turn):
     """
     types, bodies = model.body_types, work.bodies
     t, n, q0, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
-    W, Y, first = part_of(bodies.W, 9, q0, n), part_of(bodies.Y, 3, q0, n), part_of(bodies.C1, 3, q0, n)
+    W, Y, first = slice_of(bodies.W, 9, q0, n), slice_of(bodies.Y, 3, q0, n), slice_of(bodies.C1, 3, q0, n)
     second, third = block(types, t, C2, 3 * n), block(types, t, C3, 9 * n)
     a, omega, alpha = vector(bodies.a_B[i]), vector(work.state.u[u0 + 3 :]), vector(work.state.u_dot[u0 + 3 :])
     for k in range(n):
@@ -383,8 +383,8 @@ def modal_columns(model, work, i, c_d, c_k, H):
     f = scaled(-2.0, add(scaled(c_d, omega), scaled(c_k, alpha)))
     A = scaled_matrix(c_k, matrix_sum(tilde(alpha), product(tilde(omega), tilde(omega))))
     for j in range(n):
-        C_j = part_of(four, 3 * n, j, 1)  # 4C_kj [a, k]
-        S_j = part_of(S, 9 * n, j, 1)  # ∫ phi_a,k phi_b,j [ab, k]
+        C_j = slice_of(four, 3 * n, j, 1)  # 4C_kj [a, k]
+        S_j = slice_of(S, 9 * n, j, 1)  # ∫ phi_a,k phi_b,j [ab, k]
         out = H[6 + j, 6:]  # row j from column j: 4C is antisymmetric in k, j, the rest symmetric
         for k in range(n):
             S_jk = tensor(S_j, n, k)
@@ -398,12 +398,12 @@ def stiffened_columns(model, work, i, c_d, c_k, H):
     """Add the terms of K_t beyond s(q) and 1C(q), and the derivatives of q_dotᵀ K_t q_dot and q_dotᵀ K_r q_dot."""
     n, q0, u0 = model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
     K_t = block(model.body_types, model.bodies.kind[i], K_TRANSLATION, 3 * n * n)
-    first_dot = part_of(work.bodies.K_t_q_dot, 3, q0, n)
-    turn_dot = part_of(work.bodies.K_r_q_dot, 3, q0, n)
+    first_dot = slice_of(work.bodies.K_t_q_dot, 3, q0, n)
+    turn_dot = slice_of(work.bodies.K_r_q_dot, 3, q0, n)
     a, omega = scaled(c_k, work.bodies.a_B[i]), vector(work.state.u[u0 + 3 :])
     q_ddot = work.state.u_dot[u0 + 6 : u0 + 6 + n]
     for j in range(n):
-        K_j = part_of(K_t, 3 * n, j, 1)  # [a, k]
+        K_j = slice_of(K_t, 3 * n, j, 1)  # [a, k]
         out = H[6 + j, 6:]
         for k in range(n):
             out[k] += dot(a, column(K_j, n, k))

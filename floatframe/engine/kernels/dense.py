@@ -3,13 +3,13 @@
 from floatframe.engine.kernels.compiler.compilation import matrix_loops, view
 from floatframe.engine.kernels.vector import add, put, scaled, sub, vector
 
-__all__ = ["add_products", "lu_factor", "lu_solve", "lu_solve_columns", "part_of", "six_columns"]
+__all__ = ["add_products", "lu_factor", "lu_solve", "lu_solve_columns", "six_columns", "slice_of"]
 
 ENOUGH = 0.25  # ratio of a pivot to the largest number of its row at which the search for it ends
 
 
 @view
-def part_of(A, width, first, n):
+def slice_of(A, width, first, n):
     """Return the numbers of n items of a flat array from item `first` on, `width` numbers for each."""
     return A[width * first : width * (first + n)]
 

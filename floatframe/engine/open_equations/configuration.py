@@ -22,6 +22,7 @@ from floatframe.model.rotations import (
     rotations_between,
     tilde,
 )
+from floatframe.model.state import State
 
 __all__ = ["Configurations", "inverse_right_jacobian"]
 
@@ -49,6 +50,15 @@ class Configurations:
             starts.append((x0, v0, n))
             x0, v0 = x0 + 7 + n, v0 + 6 + n
         return starts
+
+    def state(self, x: Array, u: Array) -> State:
+        """Return the state for x, (n_x,), and velocities u, (n_v,)."""
+        r, p, q = [], [], [np.zeros(0)]
+        for j, _, n in self.parts():
+            r.append(x[j : j + 3])
+            p.append(x[j + 3 : j + 7])
+            q.append(x[j + 7 : j + 7 + n])
+        return State(np.array(r), np.array(p), np.concatenate(q), u)
 
     def retract(self, x: Array, dx: Array) -> Array:
         """Return x (+) dx, (n_x,): r + dr, R exp(dtheta), q + dq, for dx (n_v,)."""

@@ -146,13 +146,7 @@ class Equations:
     def engine_state(self, x: Array, v: Array | None = None) -> State:
         """Return the state for x and v in the frames of the engine; the default of v is zero."""
         x = vector("x", x, self.n_x)
-        r, p, q = [], [], [np.zeros(0)]
-        for j, _, n in self.configurations.parts():
-            r.append(x[j : j + 3])
-            p.append(x[j + 3 : j + 7])
-            q.append(x[j + 7 : j + 7 + n])
-        u = np.zeros(self.n_v) if v is None else vector("v", v, self.n_v)
-        return State(np.array(r), np.array(p), np.concatenate(q), u)
+        return self.configurations.state(x, np.zeros(self.n_v) if v is None else vector("v", v, self.n_v))
 
     def start(self, state: State | None = None, *, t: float = 0.0) -> tuple[Array, Array, Array, Array]:
         """Return consistent x, v, a, lam at time t near a state (default: the assembled bodies).

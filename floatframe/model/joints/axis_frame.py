@@ -8,7 +8,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.errors import ModelError
-from floatframe.model.checked_values import unit_vector
+from floatframe.model.checked_values import rotation_of, unit_vector
 from floatframe.model.functions.time_functions import TimeFunction, constant
 from floatframe.model.rotations import cross
 
@@ -17,6 +17,7 @@ __all__ = [
     "axis_in_b",
     "checked_axes",
     "checked_motions",
+    "checked_rotation",
     "given_motions",
     "normals_of",
     "turning_frame",
@@ -54,6 +55,12 @@ def checked_axes(joint: Any) -> None:
     for name in ("axis", "axis_b"):
         if getattr(joint, name, None) is not None:  # not every joint has an axis on B
             object.__setattr__(joint, name, unit_vector(f"joint {joint.name!r}: {name}", getattr(joint, name)))
+
+
+def checked_rotation(joint: Any) -> None:
+    """Make `rotation` of a joint orthonormal to roundoff, if it is given; raise `ModelError` if it is no rotation."""
+    if joint.rotation is not None:
+        object.__setattr__(joint, "rotation", rotation_of(f"joint {joint.name!r}: rotation", joint.rotation))
 
 
 if TYPE_CHECKING:

@@ -11,12 +11,12 @@ from fe_models.foundation.arrays import Array, GivenArray, GivenArrayOrNone, giv
 from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Place
-from floatframe.model.checked_values import rotation_of
 from floatframe.model.joints.axis_frame import (
     GivenMotions,
     axis_in_b,
     checked_axes,
     checked_motions,
+    checked_rotation,
     given_motions,
     normals_of,
 )
@@ -67,8 +67,7 @@ class FixedJoint(Joint):
     moment_b = MOMENT  #: index at which the moment on B starts in the wrench
 
     def __post_init__(self) -> None:
-        if self.rotation is not None:
-            object.__setattr__(self, "rotation", rotation_of(f"joint {self.name!r}: rotation", self.rotation))
+        checked_rotation(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
         """Return the rows for the assembled axes of the markers, (3, 3), and d = r_B - r_A, (3,), in ground axes."""
@@ -110,8 +109,7 @@ class ConstantOrientation(Joint):
     moment_b = MOMENT  #: index at which the moment on B starts in the wrench
 
     def __post_init__(self) -> None:
-        if self.rotation is not None:
-            object.__setattr__(self, "rotation", rotation_of(f"joint {self.name!r}: rotation", self.rotation))
+        checked_rotation(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
         """Return the rows for the assembled axes of the markers, (3, 3), and d = r_B - r_A, (3,), in ground axes."""

@@ -15,7 +15,7 @@ from fe_models.foundation.paths import near_file
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from fe_models.foundation.units import Units
-from fe_models.foundation.words import nearest, quoted
+from fe_models.foundation.words import is_number, nearest, quoted
 from floatframe.durability.shaking.structure.model import STANDARD_GRAVITY, gravity_in
 from floatframe.errors import ModelError
 
@@ -171,15 +171,6 @@ def read_level(path: Path, unit: str, where: str) -> Level:
         places.append(f"{path.name}, line {number}")
     table = np.array(rows).reshape(-1, 2)
     return Level(table[:, 0], table[:, 1], unit, where, places)
-
-
-def is_number(word: str) -> bool:
-    """Whether a word is a number."""
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
 
 
 def known_unit(unit: str, where: str) -> str:

@@ -25,6 +25,7 @@ from floatframe.durability.shaking.loads.levels import Level, in_model
 from floatframe.durability.shaking.loads.uncertainty import Uncertainty
 from floatframe.durability.shaking.responses.resolved import resolved_band
 from floatframe.durability.shaking.responses.scalars import scalar_outputs, scalar_sizes
+from floatframe.durability.shaking.responses.time_steps import state_matrix
 from floatframe.durability.shaking.structure.model import Output, ShakenModel, moving, response
 from floatframe.errors import ModelError
 
@@ -164,10 +165,7 @@ def sweep_envelope(model: ShakenModel, k: int, test: SineTest, step: float = STE
     sign = -1.0 if test.downward else 1.0
     second = 1 / model.units.time
     n_m, n_d = len(model.omega), len(model.omega) - model.n_residual
-    A = np.zeros((2 * n_d, 2 * n_d))
-    A[:n_d, n_d:] = np.eye(n_d)
-    A[n_d:, :n_d], A[n_d:, n_d:] = -np.diag(model.omega[:n_d] ** 2), -model.C[:n_d, :n_d]
-    mu, X = np.linalg.eig(A * second)  # states (eta, eta_dot): rates in 1/s
+    mu, X = np.linalg.eig(state_matrix(model, n_d) * second)  # states (eta, eta_dot): rates in 1/s
     c = np.linalg.solve(X, np.concatenate([np.zeros(n_d), model.B[2, :n_d, k]]) * second)
     level = test.level
     to_model = in_model(level, model.inputs[k].rpartition(":")[2], model.units)

@@ -16,7 +16,7 @@ from scipy.signal import lfilter
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.durability.shaking.structure.model import ShakenModel
 
-__all__ = ["Motion", "base_motions", "histories", "oscillator"]
+__all__ = ["Motion", "base_motions", "histories", "oscillator", "state_matrix"]
 
 LONGEST_STEP = 4.0  #: omega h up to which the series loses fewer than three digits
 MOST_TERMS = 80  #: largest number of terms of the series
@@ -159,13 +159,18 @@ def motion_of_input(values: Array, rate: int, h: float) -> Motion:
     return Motion(np.asarray(values, dtype=float), zero, zero)
 
 
-def coupled(model: ShakenModel, load: Array, h: float) -> tuple[Array, Array]:
-    """Return eta and eta_dot of modes coupled by damping, (n_d, n_t) each, by filters in eigenvectors of the states."""
-    n_d, n_t = load.shape
+def state_matrix(model: ShakenModel, n_d: int) -> Array:
+    """Return the matrix A of the states of the first n_d modes, (eta, eta_dot)_dot = A (eta, eta_dot) at rest."""
     A = np.zeros((2 * n_d, 2 * n_d))
     A[:n_d, n_d:] = np.eye(n_d)
     A[n_d:, :n_d], A[n_d:, n_d:] = -np.diag(model.omega[:n_d] ** 2), -model.C[:n_d, :n_d]
-    mu, X = np.linalg.eig(A)
+    return A
+
+
+def coupled(model: ShakenModel, load: Array, h: float) -> tuple[Array, Array]:
+    """Return eta and eta_dot of modes coupled by damping, (n_d, n_t) each, by filters in eigenvectors of the states."""
+    n_d, n_t = load.shape
+    mu, X = np.linalg.eig(state_matrix(model, n_d))
     left = np.linalg.solve(X, np.vstack([np.zeros((n_d, n_d)), np.eye(n_d)]))
     eta, eta_dot = np.zeros((n_d, n_t)), np.zeros((n_d, n_t))
     for k in range(2 * n_d):

@@ -15,7 +15,7 @@ from cms.assessment.quality.reference.free_pencil import whole_pencil
 from cms.body.reduced_body import ReducedBody, ReducedInterface
 from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
 from fe_models.body.rigid_motion import rigid_motion_of_points
-from fe_models.foundation.arrays import STRESS_COMPONENTS, Array
+from fe_models.foundation.arrays import STRESS_COMPONENTS, Array, symmetric_part
 from fe_models.foundation.units import Units
 from floatframe.durability.shaking.structure.damping import Damping
 from floatframe.durability.shaking.structure.model import DIRECTIONS, Base, Output, ShakenModel, rigid_rows
@@ -79,7 +79,7 @@ def held_by_bases(where: str, M: Array, K: Array, G: Array, R: Array, scale: Arr
     _, values, right = la.svd(rows[:, None] * G * S)
     rank = int((values > RANK * values[0]).sum()) if len(values) and values[0] > 0 else 0
     N = S[:, None] * right[rank:].T  # (1)
-    K_N, M_N = symmetric(N.T @ K @ N), symmetric(N.T @ M @ N)
+    K_N, M_N = symmetric_part(N.T @ K @ N), symmetric_part(N.T @ M @ N)
     require_held(where, K_N)
     if rigid is None:
         T_0 = S[:, None] * la.lstsq(rows[:, None] * G * S, rows[:, None] * R, cond=RANK)[0]
@@ -131,11 +131,6 @@ def scale_of(K: Array, M: Array) -> float:
     k, m = np.diag(K), np.diag(M)
     both = (k > 0) & (m > 0)
     return float((k[both] / m[both]).min()) if both.any() else 1.0
-
-
-def symmetric(matrix: Array) -> Array:
-    """Return the symmetric part of a matrix that is symmetric except for rounding errors."""
-    return np.asarray((matrix + matrix.T) / 2)
 
 
 # A reduced body on bases, with driven interfaces, its rigid motion and its modes --------------------------------------

@@ -20,7 +20,7 @@ from floatframe.engine.kernels.connections.coordinate import (
     coordinate_motion,
     coordinate_rows,
 )
-from floatframe.engine.kernels.dense import part_of
+from floatframe.engine.kernels.dense import slice_of
 from floatframe.engine.kernels.time_function import time_function
 from floatframe.model.functions.expressions import (
     ABS,
@@ -283,7 +283,7 @@ def user_gradients(model, work, c):
     user_values(model, work, c)
     if model.users.address[u] == 0:
         for j in range(n_out):
-            f, gradient = model.users.tape0[u] + j, part_of(work.users.gradients, n_in, j, 1)
+            f, gradient = model.users.tape0[u] + j, slice_of(work.users.gradients, n_in, j, 1)
             tape_gradient(model.tapes, model.functions, f, work.users.inputs, work.tapes, gradient)
         return
     first = model.elements.coordinate0[element_of(model, c)]
@@ -359,7 +359,7 @@ def user_force_derivatives(model, work, c, c_k):
     for j in range(n_out):
         r = core + j if j < n_forces else core + n_forces + 3 * (j - n_forces) + 1
         V[r, r] = 1.0
-        by_x, by_v, by_z = input_parts(part_of(work.users.gradients, n_in, j, 1), n)
+        by_x, by_v, by_z = input_parts(slice_of(work.users.gradients, n_in, j, 1), n)
         for p in range(first, last):
             coordinate_gradient(model, work, p, r, -c_k * by_x[p - first], -c_k * by_v[p - first])
         for s in range(n_states):

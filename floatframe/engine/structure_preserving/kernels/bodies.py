@@ -30,7 +30,7 @@ from floatframe.engine.kernels.body import (
     trace_less,
 )
 from floatframe.engine.kernels.compiler.compilation import inner, loops
-from floatframe.engine.kernels.dense import part_of
+from floatframe.engine.kernels.dense import slice_of
 from floatframe.engine.kernels.model import C2, C3, DAMPING, K_TRANSLATION, MASS, S_AB, STIFFNESS
 from floatframe.engine.kernels.rotation import matrix_of_euler_parameters
 from floatframe.engine.kernels.vector import (
@@ -242,7 +242,7 @@ def body_step(model, step, i):
         step.q_mean[q0 + k] = step.q_0[q0 + k] + (0.0 if step.is_still else 0.5 * dq)
     if not step.is_closing:
         put(step.s_1[i], 0, center(types, t, n, step.q_1[q0 : q0 + n], step.C))
-    put(step.s_mean[i], 0, center(types, t, n, step.q_mean[q0 : q0 + n], part_of(step.C_mean, 3, q0, n)))
+    put(step.s_mean[i], 0, center(types, t, n, step.q_mean[q0 : q0 + n], slice_of(step.C_mean, 3, q0, n)))
 
 
 @inner
@@ -286,7 +286,7 @@ def body_inertia(model, discrete, step, i):
             out[u0 + 6 + k] = h * (Y[k] - step.P_0[u0 + 6 + k])
         return
     d, theta, Pi_0 = vector(step.z[u0:]), vector(step.z[u0 + 3 :]), vector(step.P_0[u0 + 3 :])
-    C_mean, N = part_of(step.C_mean, 3, q0, n), step.force
+    C_mean, N = slice_of(step.C_mean, 3, q0, n), step.force
     put(out, u0, scaled(m, sub(d, scaled(h, turned_back(R, vector(step.w_0[u0:]))))))
     if discrete.scheme == VARIATIONAL:
         interval(model, discrete, step, i)

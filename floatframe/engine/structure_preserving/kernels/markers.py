@@ -25,7 +25,7 @@ import math
 
 from floatframe.engine.kernels.body import column_sum
 from floatframe.engine.kernels.compiler.compilation import inner, loops, small
-from floatframe.engine.kernels.dense import part_of
+from floatframe.engine.kernels.dense import slice_of
 from floatframe.engine.kernels.marker import bent_shapes, shape, shape_sum
 from floatframe.engine.kernels.rotation import exp_matrix, left_jacobian
 from floatframe.engine.kernels.vector import (
@@ -133,7 +133,7 @@ def marker_step(model, discrete, step, m):
     dx = add(vector(step.d[i]), cross(vector(step.theta_G[i]), lever))
     put_matrix(step.E_mean[m], scaled_matrix(0.5, matrix_sum(E_0, E_1)))
     if n:
-        o, C, dq = model.markers.psi0[m], part_of(step.C_mean, 3, q0, n), step.dq[q0 : q0 + n]
+        o, C, dq = model.markers.psi0[m], slice_of(step.C_mean, 3, q0, n), step.dq[q0 : q0 + n]
         psi = step.psi[6 * discrete.psi0[m] :]
         if o >= 0:
             bent_shapes(model, m, n, step.q_mean[q0 : q0 + n], 1.0, psi)
