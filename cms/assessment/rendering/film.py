@@ -180,7 +180,7 @@ def run_ffmpeg(frames: Iterable[Image], path: Path, fps: float, options: Sequenc
     source = iter(frames)
     first = next(source)
     height, width = first.shape[:2]
-    given = ("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", repr(fps), "-i", "-")
+    given = ("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", repr(float(fps)), "-i", "-")
     with tempfile.TemporaryFile() as errors:
         command = [ffmpeg_path(path), "-y", "-loglevel", "error", *given, *options, str(path)]
         with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=errors) as process:

@@ -3,6 +3,7 @@ import os
 import subprocess
 import sys
 from dataclasses import fields, replace
+from fractions import Fraction
 from types import SimpleNamespace
 
 import numpy as np
@@ -317,6 +318,13 @@ def test_the_size_of_a_film_is_bounded(tmp_path):
 def test_a_film_that_ffmpeg_cannot_write_is_told(tmp_path):
     with pytest.raises(RenderError, match="ffmpeg could not write the film"):
         write_film(list(shaded_frames(2)), tmp_path / "nowhere" / "disc.mp4", fps=25)
+
+
+@pytest.mark.parametrize("fps", [12, np.float64(12.0), Fraction(12)])
+def test_a_rate_may_be_any_number(fps, tmp_path):
+    write_film(shaded_frames(3), tmp_path / "disc.mp4", fps=fps)
+    told = subprocess.run([film.ffmpeg_path(tmp_path), "-i", tmp_path / "disc.mp4"], capture_output=True, check=False)
+    assert b"12 fps" in told.stderr
 
 
 def test_frames_of_one_colour_make_a_film(tmp_path):
