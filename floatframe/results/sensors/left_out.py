@@ -2,10 +2,13 @@
 
 The modal file has left-out shapes W (`cms.body.left_out_modes`) and the forces y on them: those of interface loads,
 load cases, spin and modal accelerations. In statics their amplitudes are eta = y, and |eta|² / 2 is the energy left
-out. In a motion the modes and W vibrate together, in vibration shapes whose parts in W are Y. The amplitude z of each
-follows from
+out. In a motion W vibrates in shapes whose parts in W are Y. The amplitude z of each follows from
 
     z'' / omega² + 2 zeta / omega z' + z = Yᵀ y,        eta = Y z.
+
+These shapes are (a) those of the free body, of modes and W together, or (b) those of W alone, whose Y diagonalises
+Wᵀ M W, beside modes that move as computed. Joints change the frequencies of (a), and the modes those of (b), so that
+either may resonate where the body in its joints does not. The estimate is the one whose largest energy is smaller.
 
 (1) y at the outputs, in the frame of the modal file
 (2) a shape whose period has fewer than `OUTPUTS` outputs responds statically, z = Yᵀ y
@@ -65,7 +68,7 @@ class LeftOutEnergy:
     strain
         Strain energy of the modes, (n_t,) [J].
     n_shapes
-        Number of vibration shapes of modes and left-out shapes together.
+        Number of vibration shapes of the estimate.
     n_static
         Number of them that respond statically, because too few outputs are in a period.
     """
@@ -121,19 +124,57 @@ class Oscillators:
     x: Array  #: (n,)
 
 
+class VibrationShapes:
+    """Shapes in which left-out shapes vibrate, and their state at the last output."""
+
+    def __init__(self, mass: Array, shares: Array, reduced: ReducedBody, interval: float) -> None:
+        """Begin before the first output.
+
+        Parameters
+        ----------
+        mass
+            1 / omega² of each shape, (n_shapes,) [s²]; 0: massless.
+        shares
+            Y: part of each left-out shape in each of them, (n_left, n_shapes).
+        reduced
+            The body, for its damping.
+        interval
+            Time between outputs [s].
+        """
+        period = 2 * np.pi * np.sqrt(mass)
+        moves = (period > 0) & (period >= OUTPUTS * interval)  # (2)
+        self.n_shapes, self.parts = len(mass), shares[:, moves]
+        self.omega = 1 / np.sqrt(mass[moves])
+        self.zeta = damping_ratios(reduced, self.omega)
+        self.state: Oscillators | None = None
+
+    def amplitudes(self, t: Array, y: Array, *, is_undeformed: bool) -> Array:
+        """Return eta at further outputs under forces y, (n_t, n_left) both; `is_undeformed`: zero at the first."""
+        eta = y.copy()
+        if len(self.omega):
+            force = y @ self.parts
+            if self.state is None:
+                before = np.zeros(len(self.omega)) if is_undeformed else force[0]
+                self.state = at_rest(self.omega, self.zeta, float(t[0]), before)
+            z, self.state = oscillation(self.omega, self.zeta, t, force, self.state)
+            eta += (z - force) @ self.parts.T
+        if is_undeformed:
+            eta[0] = 0.0
+        return eta
+
+
 class LeftOutShapes:
     """Left-out shapes of one body. `take` takes the outputs of a motion in order, in one or several parts."""
 
     def __init__(self, system: System, body: FlexibleBody, modes: LeftOutModes, interval: float) -> None:
         """Begin a motion with this interval between its outputs [s]."""
         self.system, self.body, self.modes = system, body, modes
-        period = 2 * np.pi * np.sqrt(modes.mass)
-        moves = (period > 0) & (period >= OUTPUTS * interval)  # (2)
-        self.parts = modes.shares[:, moves]
-        self.omega = 1 / np.sqrt(modes.mass[moves])
-        self.zeta = damping_ratios(body.reduced, self.omega)
-        self.state: Oscillators | None = None
-        self.energies: list[tuple[Array, Array, Array]] = []
+        alone, Y = np.linalg.eigh((modes.shares * modes.mass) @ modes.shares.T)  # of Wᵀ M W
+        self.vibrations = (
+            VibrationShapes(modes.mass, modes.shares, body.reduced, interval),  # (a)
+            VibrationShapes(np.maximum(alone, 0.0), Y, body.reduced, interval),  # (b)
+        )
+        self.outputs: list[tuple[Array, Array, Array, Array]] = []  #: times, strain energies, energies of (a) and (b)
 
     def take(self, trajectory: Trajectory) -> None:
         """Take further outputs of the motion."""
@@ -146,25 +187,17 @@ class LeftOutShapes:
             interface_loads(self.system, trajectory, self.body),
             case_amplitudes(self.system, trajectory, self.body),
         )
-        is_undeformed = not self.energies and not motion.q[0].any()
-        eta = y.copy()
-        if len(self.omega):
-            force = y @ self.parts
-            if self.state is None:
-                before = np.zeros(len(self.omega)) if is_undeformed else force[0]
-                self.state = at_rest(self.omega, self.zeta, float(motion.t[0]), before)
-            z, self.state = oscillation(self.omega, self.zeta, motion.t, force, self.state)
-            eta += (z - force) @ self.parts.T
-        if is_undeformed:
-            eta[0] = 0.0
+        is_undeformed = not self.outputs and not motion.q[0].any()
+        a, b = (each.amplitudes(motion.t, y, is_undeformed=is_undeformed) for each in self.vibrations)
         strain = motion.q**2 @ np.diag(self.body.reduced.K) / 2
-        self.energies.append((motion.t, (eta**2).sum(axis=1) / 2, strain))
+        self.outputs.append((motion.t, strain, (a**2).sum(axis=1) / 2, (b**2).sum(axis=1) / 2))
 
     def result(self) -> LeftOutEnergy:
         """Return the energies up to the last output."""
-        t, energy, strain = (np.concatenate([np.zeros(0), *parts]) for parts in zip(*self.energies, strict=True))
-        n = len(self.modes.mass)
-        return LeftOutEnergy(self.body.name, t, energy, strain, n, n - len(self.omega))
+        t, strain, *energies = (np.concatenate([np.zeros(0), *parts]) for parts in zip(*self.outputs, strict=True))
+        k = int(np.argmin([energy.max(initial=0.0) for energy in energies]))
+        n = self.vibrations[k].n_shapes
+        return LeftOutEnergy(self.body.name, t, energies[k], strain, n, n - len(self.vibrations[k].omega))
 
 
 def left_out_shapes(system: System, interval: float, names: Sequence[str] | None = None) -> list[LeftOutShapes]:

@@ -19,6 +19,7 @@ from cms.reduction.reduction import reduce
 from fe_models.body.fe_body import Interface
 from floatframe import (
     GROUND,
+    FixedJoint,
     FlexibleBody,
     GeneralizedAlpha,
     Gravity,
@@ -186,6 +187,31 @@ def test_the_estimate_is_near_the_energy_that_the_whole_model_has_beside_the_mod
     assert 0.6 <= found.energy.max() / true.max() <= 1.6
     assert 0.6 <= found.energy.mean() / true.mean() <= 1.6
     assert 0.6 <= found.share / (true.max() / strain.max()) <= 1.6
+
+
+def pinned(reduced, end):
+    """A beam on a pin at its left end, or clamped there, pushed at once at the other; no damping."""
+    joint = {"pin": RevoluteJoint, "clamp": FixedJoint}[end]
+    axis = {"axis": (0, 0, 1)} if end == "pin" else {}
+    hold = joint(end, Marker(GROUND), Marker("bar", "left"), **axis)
+    push = PointForce("push", Marker("bar", "right"), (0, 30.0, 0))
+    return System([FlexibleBody("bar", reduced, stiffening=False)], [hold], [push])
+
+
+@pytest.mark.parametrize("end", ["pin", "clamp"])
+def test_a_joint_does_not_let_the_estimate_resonate(end):
+    """A free vibration of the beam, 998 Hz, is near one of its modes on the pin, and W alone has others."""
+    part = cms.couple(beam(8, length=0.6, A=4e-4, Iy=1e-8, Iz=2e-8, J=3e-8))
+    with Families(part) as families:
+        few, all_ = MODE_SETS["craig-bampton"](families, n_modes=3), all_dofs(part)
+        own, rich = (reduce(families, modes, geometric=False, errors=modes is few) for modes in (few, all_))
+    condition = frame_condition(part, cms.TisserandFrame())
+    Phi, Phi_rich = (finish(part, modes, condition).Phi for modes in (few, all_))
+    u = Phi_rich @ integrate(pinned(rich, end), GeneralizedAlpha(), 0.03, 1e-4, watch="off").body("bar").q.T
+    e = u - Phi @ np.linalg.solve(Phi.T @ part.K @ Phi, Phi.T @ (part.K @ u))
+    true = (e * (part.K @ e)).sum(axis=0) / 2
+    found = integrate(pinned(own, end), GeneralizedAlpha(), 0.03, 1e-4, watch="off").left_out["bar"]
+    assert 0.5 <= found.energy.max() / true.max() <= 2
 
 
 def test_outputs_too_far_apart_leave_the_static_estimate(body, reductions, whole):
