@@ -25,7 +25,8 @@ class ErrorEstimates:
         Estimate of f_reduced / f - 1 for each of the lowest free frequencies, (n_judged,), where f is the exact
         frequency of the same number. The exact error is not smaller.
     bound
-        Rigorous bound b, (n_judged,): some exact frequency f satisfies |(f_reduced / f)² - 1| <= b.
+        Bound b, (n_judged,): some exact frequency f satisfies |(f_reduced / f)² - 1| <= b, if the random tests of
+        large sets measure enough of the residual.
     shape
         Estimate of the error of each shape in the norm of strain energy, relative to the shape, (n_judged,).
     response
@@ -71,5 +72,5 @@ class ErrorEstimates:
 
     @property
     def distance(self) -> Array:
-        """Rigorous bound of |f_reduced / f - 1| for some exact frequency f, (n_judged,); inf: no bound."""
+        """Bound of |f_reduced / f - 1| for some exact frequency f, (n_judged,); inf: no bound."""
         return np.where(self.bound < 1, 1 - np.sqrt(np.maximum(1 - self.bound, 0.0)), np.inf)

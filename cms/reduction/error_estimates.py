@@ -74,7 +74,7 @@ LOWEST = 0.05  #: lowest frequency of a response divided by the first elastic on
 POINTS = 33  #: number of frequencies around each mode at which responses are compared
 METHOD = (
     "frequency, shape, response: estimates by the Rayleigh-Ritz method with one step of inverse iteration; bound: "
-    "rigorous, from the residual (random tests measure what its samples leave out); static responses: computed, not "
+    "from the residual, a small part of which random tests measure in large sets; static responses: computed, not "
     "estimated"
 )
 

@@ -150,7 +150,7 @@ ENTRIES = {
     "/errors/frequency": Entry(
         "(n_judged,)", "estimate of f_reduced / f - 1 of the lowest free frequencies; the exact error is not smaller",
     ),
-    "/errors/bound": Entry("(n_judged,)", "rigorous bound of |(f_reduced / f)^2 - 1| for some exact frequency f"),
+    "/errors/bound": Entry("(n_judged,)", "bound of |(f_reduced / f)^2 - 1| for some exact frequency f"),
     "/errors/shape": Entry(
         "(n_judged,)", "estimated error of the shape in the norm of strain energy, relative to the shape",
     ),
