@@ -213,7 +213,7 @@ class CorrectionLoads:
         mass = np.diag(self.basis.is_massive.astype(float))
         V_F = np.hstack([mass, inner(self.basis.Phi, self.directions)]) @ self.C
         size = np.sqrt((V_F**2 / self.basis.omega2[:, None]).sum(axis=0))
-        return np.where(size > 0, size, size.max())
+        return np.where(size > 0, size, size.max(initial=0.0))
 
     def sums(self, S: Array) -> Array:
         """Return F S, (n_dof, k)."""

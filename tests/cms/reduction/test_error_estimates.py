@@ -14,6 +14,8 @@ from cms.errors import BodyError
 from cms.modes.families.families import Families
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets import MODE_SETS
+from cms.reduction.basis.free_basis import free_basis
+from cms.reduction.error_estimates import frequency_errors
 from cms.reduction.reduction import reduce
 from fe_models.body.fe_body import Interface
 from fe_models.files.matrices.given import body_from_matrices
@@ -112,6 +114,13 @@ def test_sampled_corrections_give_the_estimates_of_all_corrections(monkeypatch, 
     assert_allclose(found.frequency, every.frequency, rtol=2e-3, atol=1e-9)
     assert_allclose(found.bound, every.bound, rtol=2e-3, atol=2e-7)
     assert_allclose(found.response, every.response, rtol=2e-3, atol=1e-6)
+
+
+def test_no_mode_has_no_error(body):
+    with Families(body) as families:
+        basis = free_basis(body, MODE_SETS["guyan"](families), families)
+        errors = frequency_errors(families, basis, 0)
+    assert [len(each) for each in (errors.frequency, errors.bound, errors.shape)] == [0, 0, 0]
 
 
 def test_the_error_of_a_shape_is_that_of_its_strain_energy(body, exact):
