@@ -338,8 +338,8 @@ def compare_left_out(file: LeftOutModes, expected: LeftOutModes, reduced: Reduce
         "load_cases": np.array([each.h for each in reduced.load_cases]).reshape(-1, reduced.n_q),
     }
     n = max(len(file.mass), len(expected.mass))
-    mass = [np.pad(each.mass, (0, n - len(each.mass))) for each in (file, expected)]
-    yield apart("errors.left_out.mass", *mass, float(expected.mass.max()), axes="shape")
+    a, b = (np.pad(each.mass, (0, n - len(each.mass))) for each in (file, expected))
+    yield apart("errors.left_out.mass", a, b, float(expected.mass.max()), axes="shape")
     a, b = ((each.shares * each.mass) @ each.shares.T for each in (file, expected))
     a, b = file.inertia @ a @ file.inertia.T, expected.inertia @ b @ expected.inertia.T
     yield apart("errors.left_out.shares", a, b, float(np.abs(b).max(initial=0.0)) or 1.0, axes="mode mode")
