@@ -38,6 +38,7 @@ __all__ = [
     "run",
     "say",
     "say_written",
+    "size_words",
     "stages",
     "vector_words",
     "version_option",
@@ -326,8 +327,12 @@ def say(text: str) -> None:
 
 def say_written(path: Path, n_bytes: int | None = None) -> None:
     """Print the name and size of a written file; without `n_bytes` the size of the file on disk."""
-    size = path.stat().st_size if n_bytes is None else n_bytes
-    say(f"wrote {path} ({size / 1e6:.2f} MB)" if size >= 1e5 else f"wrote {path} ({size / 1e3:.1f} kB)")
+    say(f"wrote {path} ({size_words(path.stat().st_size if n_bytes is None else n_bytes)})")
+
+
+def size_words(n_bytes: int) -> str:
+    """Return the size of a file as text, in MB or kB."""
+    return f"{n_bytes / 1e6:.2f} MB" if n_bytes >= 1e5 else f"{n_bytes / 1e3:.1f} kB"
 
 
 def escape(cell: Any) -> str:

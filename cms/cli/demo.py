@@ -15,7 +15,7 @@ from typing import IO, Annotated
 import typer
 
 import cms
-from cms.cli.console import guarded, print_table, say, stages
+from cms.cli.console import guarded, print_table, say, size_words, stages
 from cms.errors import JobError
 
 __all__ = ["demo_command", "run_demo"]
@@ -157,8 +157,8 @@ def list_files(folder: Path) -> None:
         "system.schema.json": "keys of crank.toml, for completion in an editor",
     }
     typer.echo()
-    rows = [(str(folder / name), f"{(folder / name).stat().st_size / 1e6:.2f}", words) for name, words in made.items()]
-    print_table("Files of the demo", ("file", "MB>", "what it is"), rows)
+    rows = [(str(folder / name), size_words((folder / name).stat().st_size), words) for name, words in made.items()]
+    print_table("Files of the demo", ("file", "size>", "what it is"), rows)
 
 
 @contextmanager

@@ -11,7 +11,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cms.cli.arguments import Memory, SetValues, Solver, Workers, changes_of
-from cms.cli.console import USER_ERROR, guarded, output_path, print_error, print_table, say, say_written, stages
+from cms.cli.console import (
+    USER_ERROR,
+    guarded,
+    output_path,
+    print_error,
+    print_table,
+    say,
+    say_written,
+    size_words,
+    stages,
+)
 from cms.cli.info import print_body
 from cms.errors import JobError
 from fe_models.foundation.errors import ReportedError
@@ -137,9 +147,9 @@ def reduce_and_write_fleet(fleet: Fleet) -> None:
         for note in row.notes:
             typer.echo(f"note: {job}: {note}", err=True)
         if not row.error:
-            megabytes = f"{output.stat().st_size / 1e6:.2f} MB"
+            size = size_words(output.stat().st_size)
             before = "done before" if row.is_known else f"{row.seconds:.2f} s"
-            say(f"{'kept' if row.is_known else 'wrote'} {output} ({megabytes}, {row.n_modes} modes, {before})")
+            say(f"{'kept' if row.is_known else 'wrote'} {output} ({size}, {row.n_modes} modes, {before})")
     failed = [(job, row.error) for job, row in zip(fleet.jobs, rows, strict=True) if row.error]
     n_known = sum(row.is_known for row in rows)
     say(f"{len(rows)} jobs: {len(rows) - n_known - len(failed)} done, {n_known} done before, {len(failed)} failed")

@@ -42,7 +42,7 @@ from floatframe.results.head import Head
 from floatframe.results.motion import Motion, motion_of
 from floatframe.results.results_file import MemorySource, segments_words, validity_text
 from floatframe.results.sensors import measured
-from floatframe.results.sensors.left_out import left_out_shapes
+from floatframe.results.sensors.left_out import left_out_estimates
 from floatframe.results.trajectory import Trajectory, read_trajectory
 from floatframe.results.validity import ValidityNote, notes_from_json, notes_to_json
 from floatframe.results.writer import ResultsPlace, ResultsWriter, last_restart
@@ -421,7 +421,7 @@ class Run:
         self.energy = EnergyWatch(self.output_every, self.h)
         self.closed = self.looked = time.monotonic()  # time of the last segment, and of the last check of rows
         self.waiting: list[Rows] = []
-        self.left_out = left_out_shapes(self.system, self.h * self.output_every)
+        self.left_out = left_out_estimates(self.system, self.h * self.output_every)
 
     def keep(self, rows: Rows) -> None:
         """Collect result rows, because one check of many rows costs as much as a check of a few."""
@@ -450,14 +450,14 @@ class Run:
             self.writer.append(told)
 
     def take_left_out(self, trajectory: Trajectory) -> None:
-        """Pass outputs to the left-out shapes of the bodies."""
-        for shapes in self.left_out:
-            shapes.take(trajectory)
+        """Pass outputs to the estimates of what modes left out."""
+        for estimate in self.left_out:
+            estimate.take(trajectory)
 
     def report_left_out(self) -> None:
         """Store and log a note for each body whose modes left out too much of its strain energy."""
-        for shapes in self.left_out:
-            found = shapes.result()
+        for estimate in self.left_out:
+            found = estimate.result()
             if found.share > LEFT_OUT_LIMIT:
                 t_first = float(found.t[np.argmax(found.shares > LEFT_OUT_LIMIT)])
                 note = ValidityNote(

@@ -42,7 +42,7 @@ from floatframe.results.small_motions.rows import LinearColumns
 from floatframe.results.small_motions.small_motions import SmallMotions
 from floatframe.results.trajectory import Trajectory
 
-__all__ = ["LeftOutEnergy", "LeftOutSensor", "LeftOutShapes", "left_out", "left_out_shapes", "share_words"]
+__all__ = ["LeftOutEnergy", "LeftOutEstimate", "LeftOutSensor", "left_out", "left_out_estimates", "share_words"]
 
 OUTPUTS = 10  #: smallest number of outputs in a period of a shape that is integrated over time
 MOST_DAMPED = 0.999  #: largest damping ratio of (3)
@@ -163,8 +163,8 @@ class VibrationShapes:
         return eta
 
 
-class LeftOutShapes:
-    """Left-out shapes of one body. `take` takes the outputs of a motion in order, in one or several parts."""
+class LeftOutEstimate:
+    """Estimate for one body. `take` takes the outputs of a motion in order, in one or several parts."""
 
     def __init__(self, system: System, body: FlexibleBody, modes: LeftOutModes, interval: float) -> None:
         """Begin a motion with this interval between its outputs [s]."""
@@ -200,14 +200,14 @@ class LeftOutShapes:
         return LeftOutEnergy(self.body.name, t, energies[k], strain, n, n - len(self.vibrations[k].omega))
 
 
-def left_out_shapes(system: System, interval: float, names: Sequence[str] | None = None) -> list[LeftOutShapes]:
-    """Return the left-out shapes of flexible bodies; of all whose modal files have them if no names are given."""
+def left_out_estimates(system: System, interval: float, names: Sequence[str] | None = None) -> list[LeftOutEstimate]:
+    """Return an estimate for each flexible body whose modal file has left-out shapes, or for those of these names."""
     found = []
     for body in system.bodies:
         if isinstance(body, FlexibleBody) and (names is None or body.name in names):
             modes = None if body.reduced.errors is None else body.reduced.errors.left_out
             if modes is not None:
-                found.append(LeftOutShapes(system, body, modes, interval))
+                found.append(LeftOutEstimate(system, body, modes, interval))
     return found
 
 
@@ -226,10 +226,10 @@ def left_out(system: System, trajectory: Trajectory, names: Sequence[str] | None
     run = trajectory.head.run
     interval = run["h"] * run["output_every"] if "h" in run and "output_every" in run else np.inf
     found = {}
-    for shapes in left_out_shapes(system, interval, names):
-        require_same_modes(trajectory, shapes.body.name, shapes.body.reduced)
-        shapes.take(trajectory)
-        found[shapes.body.name] = shapes.result()
+    for estimate in left_out_estimates(system, interval, names):
+        require_same_modes(trajectory, estimate.body.name, estimate.body.reduced)
+        estimate.take(trajectory)
+        found[estimate.body.name] = estimate.result()
     return found
 
 
