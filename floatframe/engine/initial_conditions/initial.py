@@ -171,7 +171,7 @@ def consistent_motion(
     require_no_half_turns(compiled, work, state)
     require_independent_constraints(compiled, work, tree_of(system).tree, state)
     state = with_compatible_velocities(compiled, work, state, known)
-    return ConsistentState(state, *solve_accelerations(compiled, work, state, known))
+    return ConsistentState(state, *solve_accelerations(compiled, work, state, known, warns=True))
 
 
 def known_of(compiled: CompiledSystem, state: State | None) -> Array | None:
@@ -353,9 +353,12 @@ def with_compatible_velocities(compiled: CompiledSystem, work: Work, state: Stat
 
 
 def solve_accelerations(
-    compiled: CompiledSystem, work: Work, state: State, known: Array | None = None
+    compiled: CompiledSystem, work: Work, state: State, known: Array | None = None, *, warns: bool = False
 ) -> tuple[Array, Array]:
-    """(3): return u_dot, (n_u,), and w, (n_w,), at a state."""
+    """(3): return u_dot, (n_u,), and w, (n_w,), at a state.
+
+    warns: log a warning if the iteration does not converge; only at a start, because rates of a motion call this often.
+    """
     from floatframe.engine.kernels.entry import rates_of_constraints
 
     model = compiled.model
@@ -382,12 +385,13 @@ def solve_accelerations(
         if is_linear or np.abs(change).max(initial=0.0) <= 1e-10 * np.abs(w).max(initial=0.0):
             break
     else:
-        log.warning(
-            "the accelerations at the start were not found in %d iterations, because friction or a user force depends "
-            "too strongly on the reactions: the motion of rigid bodies may not exist, or not be unique; use a smaller "
-            "coefficient of friction, or a bushing in place of the joint",
-            MOST_ITERATIONS,
-        )
+        if warns:
+            log.warning(
+                "the accelerations at t = %g were not found in %d iterations, because friction or a user force depends "
+                "too strongly on the reactions: the motion of rigid bodies may not exist, or not be unique; use a "
+                "smaller coefficient of friction, or a bushing in place of the joint",
+                float(work.state.time), MOST_ITERATIONS,
+            )  # fmt: skip
     return in_ground_axes(model, state, y), w
 
 
