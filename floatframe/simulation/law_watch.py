@@ -16,7 +16,7 @@ from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.callbacks import Callback
 from floatframe.engine.compiling.public_elements import PlacedLaw
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
-from floatframe.engine.initial_conditions.newton_equations import linearized, set_iterate
+from floatframe.engine.initial_conditions.newton_equations import set_iterate
 from floatframe.engine.kernels.memory import Memory
 from floatframe.engine.kernels.work import Work, new_work
 from floatframe.model.forces import UserForce
@@ -59,6 +59,8 @@ class LawWatch:
 
     def observe(self, memory: Memory, n_done: int, *, is_last: bool) -> list[str]:
         """Check the steps since the last check, up to the given memory; return new messages."""
+        from floatframe.engine.kernels.entry import evaluate_and_linearize
+
         if all(law.is_told for law in self.laws) or (n_done - self.n_seen < N_STEPS and not is_last):
             return []
         first, self.n_seen = self.n_seen, n_done
@@ -69,7 +71,7 @@ class LawWatch:
             self.work = new_work(model)
         set_iterate(self.work, memory.state, w=memory.w)
         self.work.state.time[...] = self.t_start + n_done * self.h
-        linearized(model, self.work, 0.0, 0.0, 1.0)
+        evaluate_and_linearize(model, self.work, 0.0, 0.0, 1.0)
         t: Array = self.t_start + self.h * (first + 0.5 * np.arange(2 * (n_done - first) + 1, dtype=float))
         t[-1] -= 1e-9 * self.h  # the run may end where a law jumps
         words = []

@@ -16,7 +16,7 @@ from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 from floatframe.engine.compiling.interface_loads import amplitudes, loads_on_interfaces
 from floatframe.engine.compiling.system import compiled_system
-from floatframe.engine.initial_conditions.newton_equations import linearized, set_iterate
+from floatframe.engine.initial_conditions.newton_equations import set_iterate
 from floatframe.engine.kernels.work import new_work
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import body_name
@@ -75,6 +75,8 @@ def force_input_unit(system: System, channel: ForceInput) -> str:
 
 def force_column(small: SmallMotions, channel: ForceInput) -> tuple[Array, Array]:
     """Return the input's column of body forces, (n_u,), and its column in the rows, (n_w,)."""
+    from floatframe.engine.kernels.entry import evaluate_and_linearize
+
     force = force_of(small.system, channel)
     key = WITH_AMPLITUDE[type(force)]
     given = getattr(force, key)
@@ -87,7 +89,7 @@ def force_column(small: SmallMotions, channel: ForceInput) -> tuple[Array, Array
         model = compiled_system(system).model
         work = new_work(model)
         set_iterate(work, small.state, w=small.work.state.w)
-        linearized(model, work, 0.0, 0.0, 1.0)
+        evaluate_and_linearize(model, work, 0.0, 0.0, 1.0)
         found.append((work.bodies.residual.copy(), work.connections.g.copy()))
     (residual, rows), (residual_1, rows_1) = found
     return residual - residual_1, rows_1 - rows

@@ -246,7 +246,7 @@ def free_row(small: SmallMotions, channel: JointCoordinate) -> int | None:
 
 def drive_rows(small: SmallMotions, drive: DriveMotion) -> Array:
     """Return row rates while one drive moves at unit rate and everything else is at rest, (n_w,)."""
-    from floatframe.engine.kernels.entry import rates_of_constraints
+    from floatframe.engine.kernels.entry import evaluate_and_linearize, rates_of_constraints
 
     system = small.system
     driven = [f"{j.name}.{c}" for j in system.joints for c in getattr(j, "motions", {})]
@@ -272,7 +272,7 @@ def drive_rows(small: SmallMotions, drive: DriveMotion) -> Array:
     work = new_work(model)
     still = State(small.state.r, small.state.p, small.state.q, np.zeros_like(small.state.u))
     set_iterate(work, still, w=small.work.state.w)
-    linearized(model, work, 1.0, 0.0, 1.0)
+    evaluate_and_linearize(model, work, 1.0, 0.0, 1.0)
     return rates_of_constraints(model, work)[0]
 
 

@@ -22,7 +22,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.engine.compiling.system import compiled_system
-from floatframe.engine.initial_conditions.newton_equations import linearized, set_iterate
+from floatframe.engine.initial_conditions.newton_equations import set_iterate
 from floatframe.engine.kernels.model import Model
 from floatframe.engine.kernels.work import Work
 from floatframe.engine.tree.kernels.tree import JointWork, Tree, new_joint_work
@@ -53,13 +53,14 @@ class TreeFlow:
 
     def wrenches(self, work: Work, state: State, u_dot: Array, w: Array) -> Array:
         """Return w with reactions of the tree joints for a motion, (n_w,); `work` then contains this iterate."""
+        from floatframe.engine.kernels.entry import evaluate_and_linearize
         from floatframe.engine.tree.kernels.entry import projected
 
         set_iterate(work, state, u_dot, w)
         projected(self.model, work, self.tree, self.placed(work))
         w = work.state.w.copy()
         set_iterate(work, state, u_dot, w)
-        linearized(self.model, work, 0.0, 0.0, 1.0)
+        evaluate_and_linearize(self.model, work, 0.0, 0.0, 1.0)
         says = ~is_held(self.model.rows.kind)
         for c in np.unique(self.tree.joint[self.tree.joint >= 0]):
             first, size = int(self.model.connections.w0[c]), int(self.model.connections.size[c])

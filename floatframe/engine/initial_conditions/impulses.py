@@ -84,7 +84,7 @@ def words_of_begun_drives(system: System, t: float, state: State | None, h: floa
     stiffness). This is right for rigid mechanisms. On elastic parts, such as bars of segments, it acts as an impulse
     whose waves long steps h do not resolve.
     """
-    from floatframe.engine.kernels.entry import rates_of_constraints
+    from floatframe.engine.kernels.entry import evaluate_and_linearize, rates_of_constraints
 
     compiled = compiled_system(system)
     model = compiled.model
@@ -99,7 +99,7 @@ def words_of_begun_drives(system: System, t: float, state: State | None, h: floa
     rates = []
     for velocity in (np.zeros_like(given.u), given.u):
         set_iterate(work, State(given.r, given.p, given.q, velocity), w=start_unknowns(model, known))
-        linearized(model, work, 1.0, 0.0, 0.0)
+        evaluate_and_linearize(model, work, 1.0, 0.0, 0.0)
         rates.append(np.abs(rates_of_constraints(model, work)[0][drives]))
     wanted, off = rates
     is_length = is_held_length(model.rows.kind)[drives]

@@ -266,13 +266,15 @@ def with_modal_weight(model: Model, H: tuple[Array, ...], stiff: float = STIFF) 
 
 def with_mass_for_all(model: Model, H: tuple[Array, ...]) -> tuple[Array, ...]:
     """Return mass matrices in which massless modes get a small mass, so that accelerations exist."""
-    complete = []
-    for i, block in enumerate(H):
-        M = modal_diagonals(model, i, MASS)
-        if (M <= 0).any():
-            K, omega = modal_diagonals(model, i, STIFFNESS), MASSLESS * highest_frequency(model)
+    massless = [modal_diagonals(model, i, MASS) <= 0 for i in range(len(H))]
+    if not any(modes.any() for modes in massless):
+        return H
+    omega, complete = MASSLESS * highest_frequency(model), []
+    for i, (block, modes) in enumerate(zip(H, massless, strict=True)):
+        if modes.any():
+            K = modal_diagonals(model, i, STIFFNESS)
             scale = omega**2 if omega > 0 else max(float(K.max()), 1.0)
-            block = block + np.diag(np.concatenate([np.zeros(6), np.where(M <= 0, np.maximum(K, 0) / scale, 0.0)]))
+            block = block + np.diag(np.concatenate([np.zeros(6), np.where(modes, np.maximum(K, 0) / scale, 0.0)]))
         complete.append(block)
     return tuple(complete)
 

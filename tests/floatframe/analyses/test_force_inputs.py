@@ -124,16 +124,16 @@ def test_a_python_force_beside_an_input_is_kept_while_it_is_called(monkeypatch):
     def spoil(inputs, outputs):
         outputs[0] = np.nan
 
-    def spoilt(*given):
+    def spoilt(*given, **named):
         gc.collect()
         others.extend(C_FUNCTION(spoil) for _ in range(64))
-        return plain(*given)
+        return plain(*given, **named)
 
-    plain, others = force_inputs.linearized, []
+    plain, others = force_inputs.set_iterate, []
     rod = RigidBody("rod", 2.0, np.diag([0.1, 0.2, 0.2]))
     pin = RevoluteJoint("pin", Marker(GROUND), Marker("rod"), axis=(0, 1, 0))
     held = UserForce("spring", {"phi": "pin.angle"}, forces=["phi"], function=spring)
     system = System(rod, pin, [held, JointForce("motor", "pin", "angle", motor=0.0)])
-    monkeypatch.setattr(force_inputs, "linearized", spoilt)
+    monkeypatch.setattr(force_inputs, "set_iterate", spoilt)
     linear = linearize(system, inputs=["motor.torque"], outputs=["pin.angle"])
     assert_allclose(linear.L @ np.linalg.solve(linear.K, linear.B), [[1 / 3.0]], rtol=1e-6)
