@@ -154,19 +154,20 @@ def integrate_many(
     require_no_units(system)
     require_watch(watch)
     method = in_formulation(made_integrator(integrator), formulation)
-    start, end, step = checked_times(t_start, t_end, h)
+    t_start, t_end, h = checked_times(t_start, t_end, h)
     if output_every < 1:
         raise ModelError(f"integrate_many: output_every: expected at least 1, got {output_every}")
-    n_steps = number_of_steps(start, end, step)
-    t: Array = np.asarray(start + (end - start) / n_steps * np.arange(0, n_steps + 1, output_every), dtype=float)
+    n_steps = number_of_steps(t_start, t_end, h)
+    t: Array = t_start + (t_end - t_start) / n_steps * np.arange(0, n_steps + 1, output_every, dtype=float)
     names = tuple(each.name for each in system.sensors) if sensors is None else tuple(sensors)
     if not names:
         raise ModelError(f"integrate_many: sensors: expected at least one, system {system.name!r} has none")
     placed = as_placed(system)
     measured = {name: measurement_of(system, placed, name) for name in names}
     columns = {name: tuple(each.columns) for name, each in measured.items()}
-    options = {"t_start": t_start, "state": state, "output_every": output_every, "watch": watch}
-    run = OneRun(system, tuple(table), names, t, (method, t_end, h), options)
+    given = {"integrator": method, "t_end": t_end, "h": h, "t_start": t_start, "state": state,
+             "output_every": output_every, "watch": watch}  # fmt: skip
+    run = OneRun(system, tuple(table), names, t, given)
     for path, values in table.items():
         run.require_topology(path, values)
     points = [tuple(row) for row in np.column_stack(list(table.values())).tolist()]
@@ -231,8 +232,7 @@ class OneRun:
     paths: tuple[str, ...]
     sensors: tuple[str, ...]
     t: Array  #: output times, (n_t,)
-    given: tuple[Any, ...]  #: integrator, end and step of the run
-    options: dict[str, Any]  #: other arguments of `integrate`
+    given: dict[str, Any]  #: other arguments of `integrate`
 
     def __repr__(self) -> str:
         """Return the name by which a message about sending the task calls it."""
@@ -244,7 +244,7 @@ class OneRun:
             system = self.changed(self.paths, values)
             if not has_same_topology(compiled_system(self.system), compiled_system(system)):
                 raise topology_error(", ".join(self.paths), INSTEAD)
-            motion = integrate(system, *self.given, **self.options)
+            motion = integrate(system, **self.given)
             found = {}
             for name in self.sensors:
                 table = np.column_stack(list(measurement_of(system, motion, name).columns.values()))
@@ -270,8 +270,7 @@ class OneRun:
 
     def at_output_times(self, t: Array, values: Array) -> Array:
         """Return the values at the output times, (n_t, n): of the last row at each time, NaN where there is none."""
-        _, _, h = self.given
-        slack = SAME_TIME * h + ROUNDINGS * np.spacing(np.abs(self.t))
+        slack = SAME_TIME * self.given["h"] + ROUNDINGS * np.spacing(np.abs(self.t))
         k = np.searchsorted(t, self.t + slack, side="right") - 1
         return np.where((np.abs(t[k] - self.t) <= slack)[:, None], values[k], np.nan)
 
