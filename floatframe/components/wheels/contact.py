@@ -115,22 +115,8 @@ def contact(x, data):
         x[1, 14] + rim[2] - x[0, 14] - road[2],
     )
     rate = -inner_product(V, normal) / cosine
-    return (
-        x_W,
-        y_W,
-        normal,
-        e,
-        point,
-        R_0 - rho,
-        rho,
-        sine,
-        cosine,
-        inner_product(V, x_W),
-        inner_product(V, y_W),
-        Omega,
-        rate,
-        left,
-    )
+    V_x, V_y = inner_product(V, x_W), inner_product(V, y_W)
+    return x_W, y_W, normal, e, point, R_0 - rho, rho, sine, cosine, V_x, V_y, Omega, rate, left
 
 
 @register_jitable(error_model="numpy")

@@ -520,7 +520,7 @@ def mean_square(model, work, i, jump):
 
 @inner
 def newton_weights(order, h):
-    """Return the derivatives of acceleration, velocity and displacement by a correction divided by c_k."""
+    """Return c_m, c_d, c_k: the derivatives of u_dot, u and x by the algorithmic acceleration a."""
     return (1 - order.alpha_m) / (1 - order.alpha_f), order.gamma * h, order.beta * h * h
 
 

@@ -33,7 +33,7 @@ from floatframe.model.joints.rows.kinds import (
 )
 
 __all__ = ["add_reaction", "add_slide", "angle_loads", "angle_of", "force_of_row", "held", "mean_distance",
-            "row_rate", "row_value"]  # fmt: skip
+           "row_rate", "row_value"]  # fmt: skip
 
 
 #: the value function of rows that depend only on positions and time, shared with all other formulations
