@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from fe_models.body.load_cases import ReducedLoadCase
 from floatframe import (
     GROUND,
+    FlexibleBody,
     Gravity,
     JointForce,
     Marker,
@@ -65,7 +66,7 @@ def bent():
 
 
 def held():
-    """Return the pair on the ground, with loads that follow functions of time, a table, and a spring of no length."""
+    """Return the pair on the ground beside a free body, with loads over time, a table, and a spring of no length."""
     plain = stiffened_body(random_point_masses(3, 3), stiffness(3, omega=6.0), size=0.2)
     f = np.array([0.3, -0.2, 0.1])
     case = ReducedLoadCase("push", "force", f, np.array([0.1, 0.2, -0.1]), np.array([0.3, -0.1, 0.2]))
@@ -77,7 +78,9 @@ def held():
         SpringDamper("centre", Marker(GROUND), Marker("soft", "end_b"), 2.0, free_length=0.0),
     ], replace(plain, load_cases=(case,)))  # fmt: skip
     pin = SphericalJoint("pin", GROUND, Marker("block", position=(0.3, 0.1, 0.0)))
-    return System(pair.bodies, [pin, *pair.joints], pair.forces)
+    free = FlexibleBody("free", stiffened_body(random_point_masses(7, 2), stiffness(7, omega=9.0)), position=(5, 0, 0),
+                        omega_B=(0.3, -0.5, 0.2))  # fmt: skip
+    return System([free, *pair.bodies], [pin, *pair.joints], pair.forces)  # its modes come before those of the pair
 
 
 #: connections act alike in the decaying scheme, which damps bodies and modes: those are in all of SYSTEMS
@@ -88,6 +91,7 @@ SYSTEMS = {
     "prismatic": lambda: loaded("prismatic"),
     "screw": lambda: loaded("screw"),
     "distance": lambda: loaded("distance"),
+    "distance, driven": lambda: loaded("distance", motions={"distance": harmonic(0.1, 5.0, offset=0.5)}),
     "universal, stiffened": bent,
     "held": held,
 }
