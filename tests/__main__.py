@@ -33,7 +33,8 @@ from tests.root import ROOT
 MOST_WORKERS = 4  #: each takes up to 3 GB
 
 n_processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-SPREAD = ("-n", str(min(n_processors, MOST_WORKERS)), "--dist", "loadfile")
+#: a worker that disappears is not replaced, so that the report names its test
+SPREAD = ("-n", str(min(n_processors, MOST_WORKERS)), "--dist", "loadfile", "--max-worker-restart", "0")
 
 LINT = ("lint", "ruff", "check", ".")
 SPELLING = (

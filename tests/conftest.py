@@ -84,3 +84,14 @@ def pytest_make_collect_report(collector):
 def fail(report):
     reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr
     report.outcome, report.longrepr = "failed", f"{reason}: nothing may skip here (FLOATFRAME_REQUIRE_ALL=1)"
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node, error):
+    """Say how a worker ended that disappeared: its own last words are lost with the output that it captured."""
+    if error:
+        process = node.gateway._io.popen
+        process.wait(timeout=30)
+        code = process.returncode
+        how = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
+        print(f"\n{node.gateway.id} ended with {how}", flush=True)
