@@ -1,6 +1,8 @@
 """One gmsh model at a time: gmsh is loaded when needed, and its options are set for repeatable meshes and restored."""
 
+import ctypes
 import os
+import signal
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -9,7 +11,7 @@ from types import ModuleType
 from fe_models.errors import MeshError, MeshingError
 from fe_models.foundation.extras import MissingExtraError, extra_module
 
-__all__ = ["gmsh_call", "gmsh_model", "load_gmsh"]
+__all__ = ["gmsh_call", "gmsh_model", "kept_sigpipe", "load_gmsh"]
 
 OPTIONS = {
     "General.Terminal": 0,
@@ -58,7 +60,8 @@ def gmsh_model(name: str, options: Mapping[str, float | str]) -> Iterator[Module
     gmsh = load_gmsh()
     was_open = bool(gmsh.isInitialized())
     if not was_open:
-        gmsh.initialize(readConfigFiles=False, interruptible=False)
+        with kept_sigpipe():
+            gmsh.initialize(readConfigFiles=False, interruptible=False)
     wanted = OPTIONS | dict(options)
     before = {option: _get(gmsh, option, value) for option, value in wanted.items()}
     try:
@@ -74,6 +77,22 @@ def gmsh_model(name: str, options: Mapping[str, float | str]) -> Iterator[Module
             _set(gmsh, option, value)
         if not was_open:
             gmsh.finalize()
+
+
+@contextmanager
+def kept_sigpipe() -> Iterator[None]:
+    """Restore how SIGPIPE is handled: as gmsh leaves it, a write to a closed pipe would end this process in silence."""
+    if sys.platform == "win32":
+        yield
+        return
+    get, put = ctypes.pythonapi.PyOS_getsig, ctypes.pythonapi.PyOS_setsig  # signal.signal works in one thread only
+    get.argtypes, get.restype = [ctypes.c_int], ctypes.c_void_p
+    put.argtypes, put.restype = [ctypes.c_int, ctypes.c_void_p], ctypes.c_void_p
+    before = get(signal.SIGPIPE)
+    try:
+        yield
+    finally:
+        put(signal.SIGPIPE, before)
 
 
 def _get(gmsh: ModuleType, option: str, like: float | str) -> float | str:

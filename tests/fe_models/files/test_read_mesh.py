@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from fe_models import read_mesh
 from fe_models.checks.mesh_report import report_mesh
 from fe_models.errors import MeshError
+from fe_models.files.cad.gmsh_model import kept_sigpipe
 from fe_models.meshes.cells.raw_mesh import mirrored_order
 from tests.fe_models.small_meshes import SOLID_TYPES, cell_mesh, faced_box, nastran_deck
 
@@ -173,7 +174,8 @@ def gmsh_files(request, tmp_path_factory):
     gmsh = pytest.importorskip("gmsh")
     kind = request.param
     folder = tmp_path_factory.mktemp(kind)
-    gmsh.initialize(interruptible=False)
+    with kept_sigpipe():
+        gmsh.initialize(interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.option.setNumber("Mesh.SecondOrderIncomplete", int(kind == "hexahedron20"))

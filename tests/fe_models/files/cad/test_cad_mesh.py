@@ -1,3 +1,5 @@
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +12,7 @@ from fe_models.errors import InterfaceError, MeshError
 from fe_models.files import MeshSize, mesh_cad
 from fe_models.selections import FaceGroup
 from tests.fe_models.small_solids import PLATE, PLATE_VOLUME, drawn, in_unit, plate_file
+from tests.root import ROOT
 
 STEEL = Material("steel", E=210000.0, nu=0.3, rho=7.85e-9)
 COARSE = MeshSize(20.0)
@@ -78,6 +81,32 @@ def test_a_file_in_inches_gives_the_mesh_of_one_in_millimetres_25_times_as_large
     assert rows["geometry"] == "STEP in inch, taken to in; 1 solid, 7 faces, volume 38869 in³"
     assert rows["mesh size"] == "20 in, 12 elements around a circle, order 2"
     assert rows["size"] == "(100, 40, 10) in"
+
+
+CLOSED_PIPE = """
+import os, sys
+from concurrent.futures import ThreadPoolExecutor
+from fe_models.files.cad.gmsh_model import gmsh_model
+
+def mesh():
+    with gmsh_model("empty", {}):
+        pass
+
+mesh() if sys.argv[1] == "main thread" else ThreadPoolExecutor().submit(mesh).result()
+reader, writer = os.pipe()
+os.close(reader)
+try:
+    os.write(writer, b"x")
+except BrokenPipeError:
+    print("an error of Python")
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="has no SIGPIPE")
+@pytest.mark.parametrize("thread", ["main thread", "another thread"])
+def test_a_write_to_a_closed_pipe_does_not_end_a_process_that_has_meshed(thread):
+    done = subprocess.run([sys.executable, "-c", CLOSED_PIPE, thread], cwd=ROOT, capture_output=True, text=True)
+    assert done.stdout == "an error of Python\n", (done.returncode, done.stderr)
 
 
 def test_the_same_file_gives_the_same_mesh(plate):
