@@ -119,7 +119,8 @@ def dissect(graph, cut, order, lo, hi, leaf, small):
                     todo.append((lo + met, lo + met + found))
                 met += found
                 n_components += 1
-        order[lo:hi] = place[:m]
+        for k in range(m):
+            order[lo + k] = place[k]
         if n_components > 1:
             continue
         vertices = order[lo:hi]
@@ -163,7 +164,8 @@ def dissect(graph, cut, order, lo, hi, leaf, small):
                 middle = at
             elif which == THERE:
                 end = at
-        order[lo:hi] = place[:m]
+        for k in range(m):
+            order[lo + k] = place[k]
         if best < np.inf and 0 < middle < end:
             todo.append((lo, lo + middle))
             todo.append((lo + middle, lo + end))

@@ -42,7 +42,8 @@ def graph_of(indptr, indices, representative, group):
     stands[representative] = True
     for fill in range(2):
         if fill:
-            start[2:] = np.cumsum(start[2:])
+            for a in range(2, n + 2):
+                start[a] += start[a - 1]  # start[1] is zero
             neighbours = np.empty(start[n + 1], np.int32)
         for a in range(n):
             j = representative[a]
@@ -209,7 +210,7 @@ def front_rows(start, neighbours, first, above):
         while c != -1:
             rows, at = append_rows(rows, at, rows, begin[c], begin[c + 1], last, seen, f)
             c = beside[c]
-        rows[begin[f] : at] = np.sort(rows[begin[f] : at])
+        rows[begin[f] : at].sort()
         begin[f + 1] = at
     return begin, rows[: begin[n_fronts]].copy()
 

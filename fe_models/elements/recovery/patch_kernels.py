@@ -37,7 +37,8 @@ def write_moments(start, samples, basis, values, part, n_parts, moments):
                     for k in range(width):
                         total[k] += a * x_a[k]
                     e += 1
-                moments[patch, term, first : first + width] = total[:width]
+                for k in range(width):
+                    moments[patch, term, first + k] = total[k]
 
 
 @jit

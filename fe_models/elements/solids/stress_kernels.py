@@ -274,7 +274,10 @@ def add_stress_defects(
             det = jacobian(x, dN[q], J, Q)
             add_gradient(u, cells[e], dN[q], Q, det, H)
             write_stress(H, tensors[of_cell[e]], 1.0, sigma)
-            d[:] = -sigma
+            for c in range(d.shape[0]):
+                row, column = d[c], sigma[c]
+                for k in range(n_k):
+                    row[k] = -column[k]
             for a in range(cells.shape[1]):
                 at, factor = rows[e, a], N[q, a]
                 for c in range(d.shape[0]):
