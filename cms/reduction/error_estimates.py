@@ -36,6 +36,7 @@ References
 
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from typing import Any
 
 import numpy as np
 import scipy.linalg as la
@@ -423,7 +424,7 @@ def inertia_errors(beside: Array, whole: Array) -> Array:
     return np.sqrt(np.maximum(beside, 0.0) / np.where(has_energy, whole, np.nan))
 
 
-def energy_error(body: FEBody, basis: FreeBasis, U: Array) -> Array:
+def energy_error(body: Any, basis: FreeBasis, U: Array) -> Array:
     """Return the relative energy error of approximating columns U by rigid motion and modes, (k,); NaN: no energy.
 
     With c = Phiᵀ K u / omega² the energy of the error e = u - Phi c is computed, not the difference of two energies.

@@ -534,6 +534,10 @@ class FEBody:
         put_translations(field_, self.dofs, u)
         return field_
 
+    def translation_rows(self, u: Array) -> Array:
+        """Return `translations` as rows, (3 n_nodes, k)."""
+        return self.translations(u).reshape(3 * len(self.nodes), u.shape[1])
+
     def with_interfaces(self, *interfaces: Interface) -> "FEBody":
         """Return the body with these interfaces added, not yet coupled."""
         return replace(self, interfaces=(*self.interfaces, *interfaces))

@@ -14,8 +14,8 @@ import numpy as np
 
 from cms.assessment.compare.comparison import Comparison, Drawing, SetResult
 from cms.assessment.compare.coordinates import ReferenceBasis
-from cms.assessment.compare.evaluation import Reference
-from cms.assessment.compare.full_model import FullModel, read_full_model, reference_digest
+from cms.assessment.compare.evaluation import SharedReference
+from cms.assessment.compare.full_model import ReferenceSolution, read_full_model, reference_digest
 from cms.assessment.compare.pulse import default_pulse
 from cms.assessment.compare.reference import Question, full_results, reference_of, solution
 from cms.assessment.compare.set_result import SetPart, counts_of_parts, joined_parts, set_part, set_result
@@ -284,7 +284,7 @@ class SetJudge:
 
     def __init__(self, source: Callable[[], FEBody], cache: str, digest: str, question: str, damping: float) -> None:
         self.given = (source, cache, digest, question, damping)
-        self.made: tuple[Families, ReferenceBasis, Reference] | None = None
+        self.made: tuple[Families, ReferenceBasis, SharedReference] | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         return SetJudge, self.given
@@ -296,7 +296,7 @@ class SetJudge:
         self.made[0].forget_vibration_modes()
         return set_part(task.name, dict(task.options), task.counts, *self.made)
 
-    def make(self) -> tuple[Families, ReferenceBasis, Reference]:
+    def make(self) -> tuple[Families, ReferenceBasis, SharedReference]:
         """Return the mode families of the body, the reference basis, and the reference."""
         source, cache, digest, question, damping = self.given
         body = source()
@@ -309,7 +309,7 @@ class SetJudge:
         return families, reference_basis(families, full), reference_of(families, full, damping)
 
 
-def reference_basis(families: Families, full: FullModel) -> ReferenceBasis:
+def reference_basis(families: Families, full: ReferenceSolution) -> ReferenceBasis:
     """Return the reference basis that all sets share."""
     ports = Ports.of_body(families.body)
     return ReferenceBasis(families, ports, full.columns, full.rigid.shape[1], float(full.omega2[0]))

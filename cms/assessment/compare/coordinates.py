@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 
+from cms.assessment.quality.reference.full_reference import fixed_rows
 from cms.assessment.quality.reference.ports import Ports
 from cms.linear_algebra.independent import DisplacementColumns, Products, independent_columns
 from cms.modes.families.families import Families
@@ -27,12 +28,16 @@ class Coordinates:
 
     K: Array  #: reduced stiffness Qᵀ K Q, (n_Q, n_Q)
     M: Array  #: reduced mass Qᵀ M Q, (n_Q, n_Q)
-    nodal: Array  #: Qᵀ Q restricted to the translations of all nodes, (n_Q, n_Q)
+    root: Array  #: L with LᵀL = QᵀQ over the translations of all nodes: |L x| is the nodal norm of Q x, (n_Q, n_Q)
     MGM: Array  #: Qᵀ M G M Q with the elastic flexibility G of the free body, (n_Q, n_Q)
-    at_b: Array  #: rows of Q that belong to the boundary dofs, (n_b, n_Q)
+    fixed: Array  #: `fixed_rows` of Q, (n_h, n_Q)
     at_ports: Array  #: motion of the interface reference points in the columns of Q, (6 n_ports, n_Q)
     reference: Array  #: coordinates of the reference columns, (n_Q, n_reference)
     columns: Array  #: coordinates of the columns of the mode set, (n_Q, n_columns)
+
+    def translation_rows(self, u: Array) -> Array:
+        """Return the translations of all nodes, in axes that keep their scalar products, (n_Q, k)."""
+        return self.root @ u
 
 
 class ReferenceBasis:
@@ -62,7 +67,7 @@ class ReferenceBasis:
         self._Q, _ = independent_columns(columns, body, omega2)
         self._reference = self._inner(self._Q, given)
         self._GM = families.flexibility(self._Q.MX)
-        self._nodal = self._translations(self._Q.X)
+        self._nodal = body.translation_rows(self._Q.X)
 
     def coordinates(self, columns: Array) -> Coordinates:
         """Return the coordinates of a mode set's columns relative to the reference, (n_dof, n_columns).
@@ -87,21 +92,18 @@ class ReferenceBasis:
         M = _joined(Q.X, Q.MX, basis.X, basis.MX)
         N = reference[:, : self.n_rigid]
         elastic = np.eye(len(M)) - N @ (N.T @ M)  # rounding of K times a rigid-body motion is not energy
-        moved = self._translations(basis.X)
+        moved = self.body.translation_rows(basis.X)
+        values, vectors = la.eigh(_joined(self._nodal, self._nodal, moved, moved))
         return Coordinates(
             K=elastic.T @ _joined(Q.X, Q.KX, basis.X, basis.KX) @ elastic,
             M=M,
-            nodal=_joined(self._nodal, self._nodal, moved, moved),
+            root=np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T,
             MGM=_joined(Q.MX, self._GM, basis.MX, self.families.flexibility(basis.MX)),
-            at_b=np.hstack([Q.X[self.body.b], basis.X[self.body.b]]),
+            fixed=fixed_rows(self.families, np.hstack([Q.X, basis.X])),
             at_ports=np.hstack([self.ports.A @ Q.X, self.ports.A @ basis.X]),
             reference=reference,
             columns=np.vstack([T_Q, T_V]),
         )
-
-    def _translations(self, X: Array) -> Array:
-        """Return the translations of all nodes, including nodes of rigid interfaces, (3 n_nodes, k)."""
-        return self.body.translations(X).reshape(3 * len(self.body.nodes), X.shape[1])
 
     def _inner(self, Q: DisplacementColumns, V: DisplacementColumns) -> Array:
         return inner(Q.KX, V.X) + self.omega2 * inner(Q.MX, V.X)

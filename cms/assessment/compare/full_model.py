@@ -8,10 +8,9 @@ from io import BytesIO
 from pathlib import Path
 
 import numpy as np
-import scipy.sparse.linalg as sla
 
 from cms.assessment.compare.pulse import Pulse
-from cms.assessment.quality.of_reduction.completeness import acceleration_labels, load_case_responses
+from cms.assessment.quality.reference.full_reference import moving_mass, static_responses
 from cms.assessment.quality.reference.port_model import PortModel
 from cms.assessment.quality.reference.ports import Ports
 from cms.assessment.quality.reference.reference_response import reference_response
@@ -20,12 +19,11 @@ from cms.errors import CompareError
 from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.modes.families.families import Families
 from fe_models.body.fe_body import FEBody
-from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.paths import replace_file
 from fe_models.foundation.ranks.spread_matrix import whole_matrix
 
-__all__ = ["FullModel", "read_full_model", "reference_digest", "solve_full_model", "write_full_model"]
+__all__ = ["ReferenceSolution", "read_full_model", "reference_digest", "solve_full_model", "write_full_model"]
 
 log = logging.getLogger(__name__)
 
@@ -33,11 +31,10 @@ VERSION = "2"  #: version of the computation; results from files of another vers
 MODES_BEYOND = 2.0  #: highest frequency of dynamically included free modes, divided by the band
 #: number of free modes first requested per mode in the band; this mostly suffices for twice its frequency
 FIRST_SEARCH = 3
-MASS_TOLERANCE = 1e-10  #: relative residual of the solutions with M_II
 
 
 @dataclass(frozen=True, eq=False)
-class FullModel:
+class ReferenceSolution:
     """Free modes, static responses, interface response and reference motion of the full model.
 
     Frequencies are in cycles per time unit of the body, displacements over all its dofs, without rigid-body motion.
@@ -106,7 +103,7 @@ def solve_full_model(
     damping: float,
     motion: Snapshots | None,
     n_expected: int = 0,
-) -> FullModel:
+) -> ReferenceSolution:
     """Solve the full model.
 
     Parameters
@@ -150,15 +147,16 @@ def solve_full_model(
     if motion is None:
         load = pulse.load(body, band=band, first=float(modes.frequencies[0]))
         motion = transient(families, load, cutoff=MODES_BEYOND * band / body.units.time, damping=damping)
-    directions = centered_directions(body)
-    return FullModel(
+    mass = moving_mass(families)
+    Psi_A, Psi_H, Psi_L = (deformation(families, each.u) for each in static_responses(families))
+    return ReferenceSolution(
         band=band,
         omega2=modes.omega2,
         rigid=families.free.N,
         Phi=modes.Phi[:, :n_band],
-        Psi_A=deformation(families, families.Psi_A),
-        Psi_H=deformation(families, families.Psi_H),
-        Psi_L=deformation(families, load_case_responses(families)),
+        Psi_A=Psi_A,
+        Psi_H=Psi_H,
+        Psi_L=Psi_L,
         moved=deformation(families, motion.columns),
         amplitudes=motion.amplitudes,
         t=motion.t,
@@ -167,55 +165,16 @@ def solve_full_model(
         port_modes=response.model.modes,
         port_rigid=response.model.rigid,
         port_error=response.error,
-        directions=directions,
-        held_mass=held_mass(families, directions),
-        mass=np.einsum("nk,nk->k", directions, body.M @ directions),
+        directions=mass.directions,
+        held_mass=mass.total,
+        mass=mass.rigid,
     )
-
-
-def static_labels(families: Families, full: FullModel) -> tuple[tuple[str, ...], ...]:
-    """Return the names of the loads that cause Psi_A, Psi_H and Psi_L."""
-    held = families.held_names("load")[0]
-    cases = tuple(case.name for case in families.body.load_cases)
-    return tuple(held[k] for k in families.free.e), acceleration_labels(full.Psi_H.shape[1]), cases
 
 
 def deformation(families: Families, u: Array) -> Array:
     """Return displacements without rigid-body motion, u - N Nᵀ M u; rigid-body motion would spoil their energy."""
     free = families.free
     return u - free.N @ (free.M_N.T @ u)
-
-
-def centered_directions(body: FEBody) -> Array:
-    """Return the geometric rigid-body modes about the centre of mass, (n_dof, 6), mesh axes."""
-    moved = rigid_motion_of_dofs(body.nodes, body.dofs)
-    M_moved = body.M @ moved
-    mass = moved[:, 0] @ M_moved[:, 0]
-    if mass <= 0:
-        return moved
-    # S = int c from the products of translations and rotations: d_x · theta_y gives S_z, d_y · theta_z S_x, …
-    products = moved[:, :3].T @ M_moved[:, 3:]
-    center = np.array([products[1, 2], products[2, 0], products[0, 1]]) / mass
-    return rigid_motion_of_dofs(body.nodes, body.dofs, center)
-
-
-def held_mass(families: Families, directions: Array) -> Array:
-    """Return the sum of the effective masses of all fixed-interface modes, (6,): b_Iᵀ M_II⁻¹ b_I, b = M d.
-
-    The rest of the mass is at the interfaces and moves with them.
-    """
-    body, fixed = families.body, families.fixed
-    M_ii, b = fixed.M_ii, (body.M @ directions)[fixed.i]
-    diagonal = M_ii.diagonal()
-    has_mass = np.flatnonzero(diagonal > 0)
-    M_ii, b, diagonal = M_ii[has_mass][:, has_mass], b[has_mass], diagonal[has_mass]
-    precondition = sla.LinearOperator(M_ii.shape, matvec=lambda x: x / diagonal)
-    total = np.zeros(b.shape[1])
-    for k in range(b.shape[1]):
-        if np.abs(b[:, k]).max(initial=0.0) > 0:
-            x, _ = sla.cg(M_ii, b[:, k], rtol=MASS_TOLERANCE, M=precondition, maxiter=2000)
-            total[k] = x @ b[:, k]
-    return total
 
 
 # The file -------------------------------------------------------------------------------------------------------------
@@ -239,7 +198,7 @@ def reference_digest(body: FEBody, *asked: object) -> str:
     return digest.hexdigest()
 
 
-def write_full_model(path: Path, full: FullModel, digest: str) -> None:
+def write_full_model(path: Path, full: ReferenceSolution, digest: str) -> None:
     """Write a reference solution to a file; raise `OSError` if this fails."""
     buffer = BytesIO()
     arrays = {field.name: getattr(full, field.name) for field in fields(full)}
@@ -247,7 +206,7 @@ def write_full_model(path: Path, full: FullModel, digest: str) -> None:
     replace_file(path, buffer.getvalue())
 
 
-def read_full_model(path: Path, digest: str) -> FullModel | None:
+def read_full_model(path: Path, digest: str) -> ReferenceSolution | None:
     """Return the reference solution with this digest; None if the file has another digest or is incomplete."""
     if not path.is_file():
         return None
@@ -255,7 +214,7 @@ def read_full_model(path: Path, digest: str) -> FullModel | None:
         with np.load(BytesIO(path.read_bytes()), allow_pickle=False) as file:
             if bytes(file["digest"]).hex() != digest:
                 return None
-            return FullModel(**{field.name: file[field.name] for field in fields(FullModel)})
+            return ReferenceSolution(**{field.name: file[field.name] for field in fields(ReferenceSolution)})
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         log.warning("%s: not a complete reference solution (%s); it is computed anew", path, error)
         return None

@@ -7,17 +7,17 @@ from pathlib import Path
 import numpy as np
 
 from cms.assessment.compare.comparison import FullResults
-from cms.assessment.compare.evaluation import Reference, drawn_entry
+from cms.assessment.compare.evaluation import SharedReference, drawn_entry
 from cms.assessment.compare.full_model import (
-    FullModel,
+    ReferenceSolution,
     read_full_model,
     reference_digest,
     solve_full_model,
-    static_labels,
     write_full_model,
 )
 from cms.assessment.compare.pulse import Pulse
 from cms.assessment.quality.of_reduction.frf import frequency_grid
+from cms.assessment.quality.reference.full_reference import static_labels
 from cms.assessment.quality.reference.port_model import modal_response
 from cms.assessment.quality.reference.transient import Snapshots
 from cms.errors import CompareError
@@ -61,7 +61,7 @@ class Question:
 class Solution:
     """Solution of the full model, and whether it was computed or read."""
 
-    full: FullModel
+    full: ReferenceSolution
     was_cached: bool
     digest: str
 
@@ -90,26 +90,26 @@ def solution(families: Families, question: Question, *, n_expected: int = 0, cac
     return Solution(full, False, digest)
 
 
-def reference_of(families: Families, full: FullModel, damping: float) -> Reference:
+def reference_of(families: Families, full: ReferenceSolution, damping: float) -> SharedReference:
     """Return the reference data for the assessment of all sets."""
     body = families.body
     time_ = body.units.time
     names = tuple(interface.name for interface in body.interfaces)
     grid = frequency_grid(LOWEST * float(full.frequencies[0]) / time_, full.band / time_, POINTS)
     response = modal_response(full.ports(names), grid, damping=damping, time=time_)
-    return Reference(
+    return SharedReference(
         full=full,
         response=response,
         drawn=drawn_entry(response),
         damping=damping,
         port_names=names,
-        static_labels=static_labels(families, full),
+        static_labels=static_labels(families),
         length=body.length,
         time=time_,
     )
 
 
-def full_results(reference: Reference, question: Question, solved: Solution) -> FullResults:
+def full_results(reference: SharedReference, question: Question, solved: Solution) -> FullResults:
     """Return the data of the full model for reports."""
     full, response, time_ = solved.full, reference.response, reference.time
     out, into = reference.drawn

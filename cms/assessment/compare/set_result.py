@@ -10,7 +10,7 @@ import numpy as np
 
 from cms.assessment.compare.comparison import Point, SetResult
 from cms.assessment.compare.coordinates import Coordinates, ReferenceBasis
-from cms.assessment.compare.evaluation import Reference, judge_subset
+from cms.assessment.compare.evaluation import SharedReference, judge_subset
 from cms.assessment.compare.free_shapes import judged_subset
 from cms.assessment.compare.subsets import SUBSETS
 from cms.assessment.compare.verdicts import is_good, set_sentence, severity, shown_point
@@ -41,7 +41,7 @@ def set_result(
     counts: Sequence[int],
     families: Families,
     basis: ReferenceBasis,
-    reference: Reference,
+    reference: SharedReference,
 ) -> SetResult:
     """Return the result of one set; if the set cannot be computed, its sentence gives the reason."""
     return joined_parts(name, [set_part(name, options, counts, families, basis, reference)])
@@ -80,7 +80,7 @@ def set_part(
     counts: Sequence[int],
     families: Families,
     basis: ReferenceBasis,
-    reference: Reference,
+    reference: SharedReference,
 ) -> SetPart:
     """Return the points of one set, the column count of each family, and the impossible numbers of modes."""
     began = time.perf_counter()
@@ -97,7 +97,7 @@ def judged_points(
     counts: Sequence[int],
     families: Families,
     basis: ReferenceBasis,
-    reference: Reference,
+    reference: SharedReference,
 ) -> tuple[list[Point], list[dict[str, int]], dict[int, str]]:
     """Return the points of one set, the column count of each family, and why other numbers are impossible."""
     make = MODE_SETS[name]

@@ -22,16 +22,16 @@ from cms.assessment.quality.of_reduction.interface_stiffening import (
 from cms.assessment.quality.of_reduction.mass_properties import check_grounding, check_mass_properties
 from cms.assessment.quality.of_reduction.residuals import residual_bounds, residual_record
 from cms.assessment.quality.record import QualityRecord, information, judge
-from cms.assessment.quality.reference.full_reference import FullReference, usable_band
+from cms.assessment.quality.reference.full_reference import FullReference, Reference, usable_band
 from cms.assessment.quality.reference.port_model import port_model
 from cms.assessment.quality.reference.transient import Snapshots
 from cms.body.reduced_body import ReducedBody
 from cms.modes.mode_set import ModeSet
-from cms.reduction.basis.free_basis import free_basis
+from cms.reduction.basis.free_basis import FreeBasis, free_basis
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.tall.columns import of_this_process
 
-__all__ = ["check_reduction", "require_same_units"]
+__all__ = ["basis_records", "check_reduction", "require_same_units"]
 
 
 def check_reduction(
@@ -109,16 +109,12 @@ def check_reduction(
     shapes = full_shapes(body, basis, reduced)
     records.append(same_body_record(body, basis, reduced, shapes))
     records += contents_records(body, modes, reduced, shapes, reference.families, basis, options)
-    records += frequency_records(compare_frequencies(reference, basis), reference.band)
-    static = completeness_records(static_completeness(reference, basis))
-    records += static
+    response = []
     if body.interfaces and [each.name for each in reduced.interfaces] != [each.name for each in body.interfaces]:
-        records.append(information("frequency-response", "the interfaces of the file are not those of the model"))
+        response.append(information("frequency-response", "the interfaces of the file are not those of the model"))
     elif body.interfaces:
-        records.append(response_of(reference, reduced))
-    records.append(residual_record(residual_bounds(reference, basis)))
-    is_complete = any(record.name == "static-inertia" and record.verdict == "pass" for record in static)
-    records.append(held_mass_record(held_mass(reference, basis), is_static_complete=is_complete))
+        response.append(response_of(reference, reduced))
+    records += basis_records(reference, basis, *response)
     condition, _ = column_condition(body, modes, float(basis.omega2[0]))
     records += [conditioning_record(condition, modes.columns.shape[1]), dropped_record(basis, modes.columns.shape[1])]
     if uncoupled is not None and has_both_kinds(uncoupled):
@@ -126,6 +122,19 @@ def check_reduction(
     if snapshots is not None:
         records.append(deformation_record(deformation_error(body, basis, snapshots)))
     return tuple(records)
+
+
+def basis_records(reference: Reference, basis: FreeBasis, *others: QualityRecord) -> list[QualityRecord]:
+    """Return records of frequencies, shapes and static responses, other records, residual bounds and effective mass."""
+    static = completeness_records(static_completeness(reference, basis))
+    is_complete = any(record.name == "static-inertia" and record.verdict == "pass" for record in static)
+    return [
+        *frequency_records(compare_frequencies(reference, basis), reference.band),
+        *static,
+        *others,
+        residual_record(residual_bounds(reference, basis)),
+        held_mass_record(held_mass(reference, basis), is_static_complete=is_complete),
+    ]
 
 
 def response_of(reference: FullReference, reduced: ReducedBody) -> QualityRecord:

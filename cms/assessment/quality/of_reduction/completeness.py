@@ -5,19 +5,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cms.assessment.quality.record import QualityRecord, information, judge
-from cms.assessment.quality.reference.full_reference import FullReference
-from cms.modes.families.families import Families
+from cms.assessment.quality.reference.full_reference import Reference
 from cms.reduction.basis.free_basis import FreeBasis
 from cms.reduction.error_estimates import energy_error
-from fe_models.body.load_cases import load_columns
 from fe_models.foundation.arrays import Array, frozen
 
-__all__ = [
-    "StaticCompleteness", "completeness_records", "load_case_responses", "static_completeness",
-]  # fmt: skip
-
-NO_LOAD = 1e-10  #: relative difference of a load and the inertia forces that balance it, below which it is rounding
-ACCELERATIONS = ("ax", "ay", "az", "alpha x", "alpha y", "alpha z")
+__all__ = ["StaticCompleteness", "completeness_records", "static_completeness"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,55 +31,18 @@ class StaticCompleteness:
         object.__setattr__(self, "load_case", frozen(self.load_case))
 
 
-def static_completeness(reference: FullReference, basis: FreeBasis) -> StaticCompleteness:
-    """Return the error for each unit interface load and each unit rigid-body acceleration.
-
-    Interface loads are balanced by the reactions at R (attachment modes Psi_A; together with R they give any balanced
-    combination of interface forces). Accelerations act with all interfaces fixed (inertia-relief modes Psi_H).
-    """
-    body, families = reference.body, reference.families
-    Psi_H, labels = families.Psi_H, families.held_names("load")[0]
-    cases = tuple(case.name for case in body.load_cases)
+def static_completeness(reference: Reference, basis: FreeBasis) -> StaticCompleteness:
+    """Return the error for each of the `static_responses`; every load case has its own scale of energy."""
+    interface, inertia, cases = reference.statics
+    space = reference.space
     return StaticCompleteness(
-        tuple(labels[k] for k in families.free.e),
-        energy_error(body, basis, families.Psi_A),
-        acceleration_labels(Psi_H.shape[1]),
-        energy_error(body, basis, Psi_H),
-        cases,
-        load_case_error(reference, basis) if cases else np.zeros(0),
+        interface.labels,
+        energy_error(space, basis, interface.u),
+        inertia.labels,
+        energy_error(space, basis, inertia.u),
+        cases.labels,
+        np.array([energy_error(space, basis, cases.u[:, [k]])[0] for k in range(len(cases.labels))]),
     )
-
-
-def load_case_error(reference: FullReference, basis: FreeBasis) -> Array:
-    """Return the relative energy error of the accelerating free body under each load case, (n_load_cases,).
-
-    A load that only accelerates the body, such as gravity, gives NaN.
-    """
-    U = load_case_responses(reference.families)
-    error = np.full(U.shape[1], np.nan)
-    for k in np.flatnonzero(U.any(axis=0)):
-        error[k] = energy_error(reference.body, basis, U[:, [k]])[0]
-    return error
-
-
-def load_case_responses(families: Families) -> Array:
-    """Return the static response of the free body to each of its load cases, (n_dof, n_load_cases).
-
-    The response is zero if a load only accelerates the body.
-    """
-    body = families.body
-    F = load_columns(body.load_cases, body.n_dof)
-    balanced = families.project(F)
-    deforms = np.linalg.norm(balanced, axis=0) > NO_LOAD * np.linalg.norm(F, axis=0)
-    U = np.zeros(F.shape)
-    if deforms.any():
-        U[:, deforms] = families.flexibility(F[:, deforms])
-    return U
-
-
-def acceleration_labels(n_r: int) -> tuple[str, ...]:
-    """Return the names of the rigid-body accelerations; numbers if the body has fewer than six."""
-    return ACCELERATIONS if n_r == 6 else tuple(f"acceleration {k + 1}" for k in range(n_r))
 
 
 def completeness_records(statics: StaticCompleteness) -> tuple[QualityRecord, ...]:

@@ -14,10 +14,10 @@ import numpy as np
 
 from cms.assessment.quality.errors import QualityError
 from cms.assessment.quality.record import QualityRecord, judge
+from cms.assessment.quality.reference.full_reference import Space
 from cms.assessment.quality.reference.transient import Snapshots
 from cms.body.reduced_body import ReducedBody
 from cms.reduction.basis.free_basis import FreeBasis
-from fe_models.body.fe_body import FEBody
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.foundation.arrays import Array, frozen
 
@@ -52,7 +52,7 @@ class DeformationError:
         return float(self.error[norm].max())
 
 
-def deformation_error(body: FEBody, basis: FreeBasis, snapshots: Snapshots) -> DeformationError:
+def deformation_error(body: Space, basis: FreeBasis, snapshots: Snapshots) -> DeformationError:
     """Compute eps(t) of a mode set in all norms of `NORMS`.
 
     Snapshots may contain any small rigid-body motion. Their columns are projected once, independent of the number of
@@ -64,8 +64,8 @@ def deformation_error(body: FEBody, basis: FreeBasis, snapshots: Snapshots) -> D
         If the snapshots are of another body, or nothing deforms.
     """
     U, a = snapshots.columns, snapshots.amplitudes
-    if len(U) != body.n_dof:
-        raise QualityError(f"deformation error: snapshots over {len(U)} dofs, body {body.name!r} has {body.n_dof}")
+    if len(U) != len(basis.Phi):
+        raise QualityError(f"deformation error: snapshots over {len(U)} dofs, the body has {len(basis.Phi)}")
     M_U = body.M @ U
     without_rigid = U - basis.N @ (basis.N.T @ M_U)
     X = basis.vibrating
@@ -80,10 +80,8 @@ def deformation_error(body: FEBody, basis: FreeBasis, snapshots: Snapshots) -> D
         "K": lengths(without_rigid, body.K @ without_rigid, a),
     }
     if not size["M"].max() > NO_DEFORMATION * lengths(U, M_U, a).max():
-        raise QualityError(f"deformation error: the reference motion does not deform body {body.name!r}")
-    rows, rigid, shapes = (
-        body.translations(part).reshape(-1, part.shape[1]) for part in (without_rigid, basis.N, basis.Phi)
-    )
+        raise QualityError("deformation error: the reference motion does not deform the body")
+    rows, rigid, shapes = (body.translation_rows(part) for part in (without_rigid, basis.N, basis.Phi))
     error["nodal"], size["nodal"] = nodal_lengths(rows, rigid, shapes, a)
     return relative(snapshots.t, error, size)
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from cms.assessment.quality.record import QualityRecord, judge
-from cms.assessment.quality.reference.full_reference import FullReference
+from cms.assessment.quality.reference.full_reference import Reference
 from cms.reduction.basis.free_basis import FreeBasis
 from fe_models.foundation.arrays import Array, IntArray, frozen
 
@@ -53,13 +53,12 @@ def mac(A: Array, B: Array, M_B: Array | None = None) -> Array:
     return np.asarray((A.T @ B) ** 2 / np.where(size > 0, size, 1.0))
 
 
-def compare_frequencies(reference: FullReference, basis: FreeBasis) -> FrequencyComparison:
+def compare_frequencies(reference: Reference, basis: FreeBasis) -> FrequencyComparison:
     """Compare the free-free modes of a mode set with those of the full model in its band."""
-    body, n = reference.body, reference.n_band
-    full, Phi = reference.frequencies[:n], reference.modes.Phi[:, :n]
-    reduced, shapes = basis.frequencies(body.units.time), basis.vibrating
-    a, b = (body.translations(X).reshape(-1, X.shape[1]) for X in (Phi, shapes))
-    return compare_shapes(full, reduced, mac(Phi, shapes, body.M @ shapes), a, b)
+    Phi, shapes = reference.Phi, basis.vibrating
+    full, reduced = reference.frequencies[: Phi.shape[1]], basis.frequencies(reference.time)
+    a, b = (reference.space.translation_rows(X) for X in (Phi, shapes))
+    return compare_shapes(full, reduced, mac(Phi, shapes, reference.space.M @ shapes), a, b)
 
 
 def compare_shapes(full: Array, reduced: Array, massed: Array, a: Array, b: Array) -> FrequencyComparison:

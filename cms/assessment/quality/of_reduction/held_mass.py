@@ -3,26 +3,23 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.sparse.linalg as sla
 
 from cms.assessment.quality.record import QualityRecord, information, judge
-from cms.assessment.quality.reference.full_reference import FullReference
+from cms.assessment.quality.reference.full_reference import Reference
 from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
 from cms.reduction.basis.free_basis import FreeBasis
-from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.foundation.arrays import Array, frozen
 
-__all__ = ["HeldMass", "answered_statically", "held_mass", "held_mass_record"]
+__all__ = ["HeldMass", "held_mass", "held_mass_record"]
 
 DIRECTIONS = ("ux", "uy", "uz", "rx", "ry", "rz")
 HELD = 1e-8  #: relative singular value of the interface motions, below which a combination keeps them fixed
-MASS_TOLERANCE = 1e-10  #: relative residual of the solutions with M_II
 NO_MASS = 1e-9  #: moving mass divided by the body mass, below which a direction has no moving mass
 
 
 @dataclass(frozen=True, eq=False)
 class HeldMass:
-    """Effective masses with fixed interfaces, about the mean of the nodes, in mesh axes, by direction."""
+    """Effective masses with fixed interfaces, about the centre of mass, in mesh axes, by direction."""
 
     frequencies: Array  #: frequencies of the mode set with all interfaces fixed, (n,) [Hz]
     mass: Array  #: effective mass and inertia of each mode, (n, 6) [kg, kg m²]
@@ -40,19 +37,17 @@ class HeldMass:
         return np.where(has_mass, 1 - self.mass.sum(axis=0) / np.where(has_mass, self.total, 1.0), 0.0)
 
 
-def held_mass(reference: FullReference, basis: FreeBasis) -> HeldMass:
+def held_mass(reference: Reference, basis: FreeBasis) -> HeldMass:
     """Compute the effective masses of a mode set with all interfaces fixed.
 
     (1) find combinations of [N Phi] that do not move the fixed dofs: null space of their rows, rotations times length
     (2) find their modes z; participation L = zᵀ M d of unit rigid-body motions d, effective mass L²
-    (3) compute the sum for the full model, b_Iᵀ M_II⁻¹ b_I, b = M d, by conjugate gradients; the mean motions that
-        distributing interfaces prevent are not subtracted
+
+    The sum for the full model does not subtract the mean motions that distributing interfaces prevent.
     """
-    body, families = reference.body, reference.families
-    d = rigid_motion_of_dofs(body.nodes, body.dofs, body.nodes.mean(axis=0))
-    b = body.M @ d
+    known = reference.mass
     X = np.hstack([basis.N, basis.Phi])
-    rows = X[families.h] * np.where(body.dofs[families.h, 1] < 3, 1.0, body.length)[:, None]
+    rows = reference.fixed_rows(X)
     size = np.linalg.norm(rows, axis=0)
     size = np.where(size > 1e-12 * size.max(initial=0.0), size, 1.0)
     _, singular, Vt = np.linalg.svd(rows / size)
@@ -68,26 +63,10 @@ def held_mass(reference: FullReference, basis: FreeBasis) -> HeldMass:
     else:
         Z = np.zeros((0, 0))
     omega2 = np.einsum("kq,kl,lq->q", Z, G_K, Z)
-    L = Z.T @ V.T @ (X.T @ b)
+    L = Z.T @ V.T @ (X.T @ (reference.space.M @ known.directions))
     order = np.argsort(omega2)
-    frequencies = np.sqrt(np.maximum(omega2[order], 0.0)) / (2 * np.pi) / body.units.time
-    return HeldMass(frequencies, L[order] ** 2, full_held_mass(reference, b), np.einsum("nk,nk->k", d, b))
-
-
-def full_held_mass(reference: FullReference, b: Array) -> Array:
-    """Return b_Iᵀ M_II⁻¹ b_I over the interior dofs with mass, (6,)."""
-    fixed = reference.families.fixed
-    M_ii = fixed.M_ii
-    diagonal = M_ii.diagonal()
-    massive = np.flatnonzero(diagonal > 0)
-    M_ii, loads = M_ii[massive][:, massive], b[fixed.i[massive]]
-    precondition = sla.LinearOperator(M_ii.shape, matvec=lambda x: x / diagonal[massive])
-    total = np.zeros(loads.shape[1])
-    for k in range(loads.shape[1]):
-        if loads[:, k].any():
-            x, _ = sla.cg(M_ii, loads[:, k], rtol=MASS_TOLERANCE, M=precondition, maxiter=2000)
-            total[k] = x @ loads[:, k]
-    return total
+    frequencies = np.sqrt(np.maximum(omega2[order], 0.0)) / (2 * np.pi) / reference.time
+    return HeldMass(frequencies, L[order] ** 2, known.total, known.rigid)
 
 
 def held_mass_record(held: HeldMass, *, is_static_complete: bool = False) -> QualityRecord:

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cms.assessment.quality.record import QualityRecord, information, judge
-from cms.assessment.quality.reference.full_reference import FullReference
+from cms.assessment.quality.reference.full_reference import Reference
 from cms.reduction.basis.free_basis import FreeBasis
-from cms.reduction.error_estimates import frequency_errors
 from fe_models.foundation.arrays import Array, frozen
 
 __all__ = ["ResidualBounds", "residual_bounds", "residual_record"]
@@ -31,12 +30,11 @@ class ResidualBounds:
         return np.sqrt(1 + self.bound) - 1
 
 
-def residual_bounds(reference: FullReference, basis: FreeBasis) -> ResidualBounds:
+def residual_bounds(reference: Reference, basis: FreeBasis) -> ResidualBounds:
     """Compute the errors of the reduced frequencies in the band (at least of the first)."""
-    frequencies = basis.frequencies(reference.body.units.time)
+    frequencies = basis.frequencies(reference.time)
     n = min(max(1, int((frequencies <= reference.band).sum())), len(frequencies))
-    errors = frequency_errors(reference.families, basis, n)
-    return ResidualBounds(frequencies[:n], errors.bound, np.minimum(errors.bound, (1 + errors.frequency) ** 2 - 1))
+    return ResidualBounds(frequencies[:n], *reference.bounds(basis, n))
 
 
 def residual_record(bounds: ResidualBounds) -> QualityRecord:

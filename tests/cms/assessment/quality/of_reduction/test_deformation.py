@@ -277,7 +277,7 @@ def test_the_record_tells_the_largest_error_and_keeps_the_history(body, families
                 free_basis(b, guyan(b), f),
                 Snapshots(rigid_motion_of_dofs(b.nodes, b.dofs), np.ones((6, 2)), np.arange(2.0)),
             ),
-            "does not deform body",
+            "does not deform the body",
         ),
     ],
 )
