@@ -25,7 +25,6 @@ from fe_models.foundation.errors import ArgumentError, BodyError
 from fe_models.foundation.presentation import Summary, listed, presented
 from fe_models.foundation.ranks.row_layout import RowLayout
 from fe_models.foundation.ranks.spread_columns import spread_parts
-from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 from fe_models.foundation.records import ArrayShape, checked_fields
 from fe_models.foundation.tall.columns import elsewhere, in_memory
 from fe_models.foundation.tall.on_disk import is_on_disk, release, row_slices, zeros_like
@@ -417,7 +416,7 @@ class FEBody:
         n_dof = len(self.dofs)
         for name in ("M", "K", "D"):
             A: Any = getattr(self, name)
-            if isinstance(A, SpreadMatrix):  # a distributed matrix was already symmetrised when it was assembled
+            if hasattr(A, "layout"):  # a distributed matrix was already symmetrised when it was assembled
                 if A.shape != (n_dof, n_dof) or not np.isfinite(A.largest):
                     raise BodyError(
                         f"{where}: {name}: expected finite entries and shape {(n_dof, n_dof)}, got {A.shape}, up to "
@@ -463,7 +462,7 @@ class FEBody:
     @property
     def layout(self) -> RowLayout | None:
         """Distribution of the rows of K and M over ranks; None if this process has the whole matrices."""
-        return self.K.layout if isinstance(self.K, SpreadMatrix) else None
+        return getattr(self.K, "layout", None)
 
     @property
     def is_coupled(self) -> bool:

@@ -1,8 +1,9 @@
 """Linear elastic materials (isotropic, orthotropic, anisotropic) and their assignment to cells."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +20,8 @@ __all__ = [
     "Material",
     "OrthotropicMaterial",
     "assign_materials",
+    "cells_of_groups",
+    "counts_of",
     "groups_of",
     "material_words",
     "require_isotropic",
@@ -326,30 +329,53 @@ def assign_materials(
         return (materials,), {kind: np.zeros(len(cells), np.int64) for kind, cells in mesh.cells.items()}
     if not materials:
         raise MaterialError("materials: expected one material, or one for each group of cells; got none")
-    used = tuple(dict.fromkeys(materials.values()))
+
+    def clash(kind: str, row: int, other: AnyMaterial, material: AnyMaterial) -> str:
+        return f"two materials, {other.name!r} and {material.name!r}; first cell: {row}"
+
+    used, number, missing = cells_of_groups("materials", mesh, materials, clash, MaterialError)
+    if missing:
+        raise MaterialError(
+            f"materials: cells without a material: {counts_of(missing)}; "
+            f"{groups_of(mesh.cell_sets, missing, 'a material')}"
+        )
+    return used, number
+
+
+def cells_of_groups(
+    where: str,
+    mesh: Any,
+    given: Mapping[str, Any],
+    clash: Callable[[str, int, Any, Any], str],
+    error: type[Exception],
+) -> tuple[tuple[Any, ...], dict[str, IntArray], dict[str, IntArray]]:
+    """Return the items that groups of cells have, for each cell type the indices into them, and the cells without one.
+
+    Parameters
+    ----------
+    clash
+        Function of cell type, row of a cell and its two items: what the cell has, for the message.
+    error
+        Raised if a group is unknown, or cells have two items.
+    """
+    used = tuple(dict.fromkeys(given.values()))
     number = {kind: np.full(len(cells), -1, np.int64) for kind, cells in mesh.cells.items()}
-    for group, material in materials.items():
+    for group, item in given.items():
         if group not in mesh.cell_sets:
-            raise MaterialError(
-                f"materials: the mesh has no group of cells {quoted(group)}{nearest(group, mesh.cell_sets)}"
-            )
-        index = used.index(material)
+            raise error(f"{where}: the mesh has no group of cells {quoted(group)}{nearest(group, mesh.cell_sets)}")
+        index = used.index(item)
         for kind, rows in mesh.cell_sets[group].items():
             taken = rows[(number[kind][rows] >= 0) & (number[kind][rows] != index)]
             if taken.size:
-                other = used[number[kind][taken[0]]].name
-                raise MaterialError(
-                    f"materials: {taken.size} {kind} cells of group {group!r} have two materials, "
-                    f"{other!r} and {material.name!r}; first cell: {taken[0]}"
-                )
+                words = clash(kind, taken[0], used[number[kind][taken[0]]], item)
+                raise error(f"{where}: {taken.size} {kind} cells of group {group!r} have {words}")
             number[kind][rows] = index
-    missing = {kind: np.flatnonzero(index < 0) for kind, index in number.items() if (index < 0).any()}
-    if missing:
-        counts = ", ".join(f"{rows.size} {kind}" for kind, rows in missing.items())
-        raise MaterialError(
-            f"materials: cells without a material: {counts}; {groups_of(mesh.cell_sets, missing, 'a material')}"
-        )
-    return used, number
+    return used, number, {kind: np.flatnonzero(index < 0) for kind, index in number.items() if (index < 0).any()}
+
+
+def counts_of(missing: Mapping[str, IntArray]) -> str:
+    """Return '3 quad, 2 triangle', the numbers of cells by type."""
+    return ", ".join(f"{rows.size} {kind}" for kind, rows in missing.items())
 
 
 def groups_of(sets: Mapping[str, Mapping[str, IntArray]], missing: Mapping[str, IntArray], what: str) -> str:

@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fe_models.errors import BeamError
-from fe_models.foundation.arrays import Array, IntArray, frozen
+from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.records import FrozenMapping, checked_fields, frozen_copies
+from fe_models.foundation.records import checked_fields, frozen_copies
+from fe_models.meshes.mesh import freeze_mesh, require_members, require_nodes
 
 __all__ = ["LineMesh", "divide_lines", "straight_line"]
 
@@ -72,31 +73,20 @@ class LineMesh:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        put = object.__setattr__
-        put(self, "nodes", frozen(self.nodes))
-        put(self, "lines", frozen(np.asarray(self.lines).reshape(-1, 2), np.int64))
-        put(self, "included", FrozenMapping(self.included))
-        put(self, "node_numbers", frozen(self.node_numbers, np.int64))
-        put(self, "line_numbers", frozen(self.line_numbers, np.int64))
-        for name in ("line_sets", "node_sets"):
-            put(self, name, FrozenMapping({group: frozen(m, np.int64) for group, m in getattr(self, name).items()}))
+        freeze_mesh(self)
+        object.__setattr__(self, "lines", self.lines.reshape(-1, 2))
         n = len(self.lines)
-        if self.nodes.ndim != 2 or self.nodes.shape[1] != 3 or not len(self.nodes):
-            raise BeamError(f"line mesh: nodes: expected (n_nodes, 3), got {self.nodes.shape}")
-        if not np.isfinite(self.nodes).all():
-            raise BeamError("line mesh: nodes: expected finite coordinates, got NaN or infinity")
-        for what, members, size in [
+        require_nodes("line mesh", self.nodes, BeamError)
+        members = [
             ("lines", self.lines, len(self.nodes)),
             *[(f"node set {g!r}", m, len(self.nodes)) for g, m in self.node_sets.items()],
             *[(f"line set {g!r}", m, n) for g, m in self.line_sets.items()],
-        ]:
-            if members.size and (members.min() < 0 or members.max() >= size):
-                raise BeamError(f"line mesh: {what}: expected 0..{size - 1}, got {members.min()}..{members.max()}")
+        ]
+        require_members("line mesh", members, BeamError)
         for name, shape in (("orientations", (n, 3)), ("offsets", (n, 2, 3))):
-            if getattr(self, name) is not None:
-                put(self, name, frozen(getattr(self, name)))
-                if getattr(self, name).shape != shape:
-                    raise BeamError(f"line mesh: {name}: expected {shape}, got {getattr(self, name).shape}")
+            given = getattr(self, name)
+            if given is not None and given.shape != shape:
+                raise BeamError(f"line mesh: {name}: expected {shape}, got {given.shape}")
 
 
 def straight_line(start: object, end: object, n: int, *, name: str = "beam") -> LineMesh:

@@ -1,7 +1,8 @@
 """The mesh of one body: nodes, solid cells, and groups for materials and interfaces."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +11,10 @@ from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import FrozenMapping, checked_fields, frozen_copies
 
-__all__ = ["FACE_TYPES", "SOLID_TYPES", "Mesh", "drop_unused_nodes", "used_nodes"]
+__all__ = [
+    "FACE_TYPES", "SOLID_TYPES", "Mesh", "drop_unused_nodes", "freeze_mesh", "require_members", "require_nodes",
+    "used_nodes",
+]  # fmt: skip
 
 #: meshio names and node order
 SOLID_TYPES = (
@@ -79,26 +83,50 @@ class Mesh:
     origin: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        put = object.__setattr__
-        put(self, "nodes", frozen(self.nodes))
-        put(self, "included", FrozenMapping(self.included))
-        put(self, "node_numbers", frozen(self.node_numbers, np.int64))
-        put(self, "notes", tuple(self.notes))
-        for name in ("cells", "faces", "cell_numbers"):
-            put(self, name, FrozenMapping({kind: frozen(c, np.int64) for kind, c in getattr(self, name).items()}))
-        for name in ("cell_sets", "face_sets"):
-            sets = {
-                group: FrozenMapping({kind: frozen(rows, np.int64) for kind, rows in by_type.items()})
-                for group, by_type in getattr(self, name).items()
-            }
-            put(self, name, FrozenMapping(sets))
-        put(self, "origin", FrozenMapping(self.origin))
-        put(self, "node_sets", FrozenMapping({group: frozen(n, np.int64) for group, n in self.node_sets.items()}))
+        freeze_mesh(self)
 
     @property
     def n_cells(self) -> int:
         """Number of solid cells."""
         return sum(len(cells) for cells in self.cells.values())
+
+
+# fields of meshes of all kinds ----------------------------------------------------------------------------------------
+
+
+def freeze_mesh(mesh: Any) -> None:
+    """Make the fields of a new mesh read-only: coordinates, vectors, indices, groups and notes."""
+    for each in fields(mesh):
+        value = getattr(mesh, each.name)
+        if each.name == "notes":
+            value = tuple(value)
+        elif each.name in ("nodes", "orientations", "offsets"):
+            value = None if value is None else frozen(value)
+        else:
+            value = frozen_indices(value)
+        object.__setattr__(mesh, each.name, value)
+
+
+def frozen_indices(value: Any) -> Any:
+    """Return read-only indices, in mappings of any depth; words stay as they are."""
+    if isinstance(value, Mapping):
+        return FrozenMapping({key: frozen_indices(part) for key, part in value.items()})
+    return value if isinstance(value, str) else frozen(value, np.int64)
+
+
+def require_nodes(where: str, nodes: Array, error: type[Exception]) -> None:
+    """Raise an error unless the nodes of a mesh are finite coordinates, (n_nodes, 3)."""
+    if nodes.ndim != 2 or nodes.shape[1] != 3 or not len(nodes):
+        raise error(f"{where}: nodes: expected (n_nodes, 3), got {nodes.shape}")
+    if not np.isfinite(nodes).all():
+        raise error(f"{where}: nodes: expected finite coordinates, got NaN or infinity")
+
+
+def require_members(where: str, members: Iterable[tuple[str, IntArray, int]], error: type[Exception]) -> None:
+    """Raise an error unless indices lie in their ranges; members: name, indices, and size of the range."""
+    for what, rows, size in members:
+        if rows.size and (rows.min() < 0 or rows.max() >= size):
+            raise error(f"{where}: {what}: expected 0..{size - 1}, got {rows.min()}..{rows.max()}")
 
 
 # nodes that belong to no solid cell, which would make the stiffness singular ------------------------------------------

@@ -5,10 +5,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array, IntArray, frozen
+from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.records import FrozenMapping, checked_fields, frozen_copies
+from fe_models.foundation.records import checked_fields, frozen_copies
+from fe_models.meshes.mesh import freeze_mesh
 
 __all__ = ["NodeCloud"]
 
@@ -50,14 +51,4 @@ class NodeCloud:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        put = object.__setattr__
-        put(self, "nodes", frozen(self.nodes))
-        put(self, "included", FrozenMapping(self.included))
-        put(self, "node_numbers", frozen(self.node_numbers, np.int64))
-        put(self, "notes", tuple(self.notes))
-        put(self, "node_sets", FrozenMapping({group: frozen(n, np.int64) for group, n in self.node_sets.items()}))
-        sets = {
-            group: FrozenMapping({kind: frozen(rows, np.int64) for kind, rows in by_type.items()})
-            for group, by_type in self.face_sets.items()
-        }
-        put(self, "face_sets", FrozenMapping(sets))
+        freeze_mesh(self)

@@ -6,10 +6,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fe_models.errors import ShellError
-from fe_models.foundation.arrays import Array, IntArray, frozen
+from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
-from fe_models.foundation.records import FrozenMapping, checked_fields, frozen_copies
+from fe_models.foundation.records import checked_fields, frozen_copies
+from fe_models.meshes.mesh import freeze_mesh, require_members, require_nodes
 
 __all__ = ["FLAT_TYPES", "ShellMesh", "flat_plate", "mapped_shell"]
 
@@ -73,30 +74,15 @@ class ShellMesh:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        put = object.__setattr__
-        put(self, "nodes", frozen(self.nodes))
-        put(self, "lines", frozen(np.asarray(self.lines).reshape(-1, 2), np.int64))
-        put(self, "included", FrozenMapping(self.included))
-        put(self, "node_numbers", frozen(self.node_numbers, np.int64))
-        put(self, "line_numbers", frozen(self.line_numbers, np.int64))
-        put(self, "notes", tuple(self.notes))
-        for name in ("cells", "line_sets", "node_sets", "cell_numbers"):
-            put(self, name, FrozenMapping({key: frozen(rows, np.int64) for key, rows in getattr(self, name).items()}))
-        sets = {
-            group: FrozenMapping({kind: frozen(rows, np.int64) for kind, rows in by_type.items()})
-            for group, by_type in self.cell_sets.items()
-        }
-        put(self, "cell_sets", FrozenMapping(sets))
-        if self.nodes.ndim != 2 or self.nodes.shape[1] != 3 or not len(self.nodes):
-            raise ShellError(f"shell mesh: nodes: expected (n_nodes, 3), got {self.nodes.shape}")
-        if not np.isfinite(self.nodes).all():
-            raise ShellError("shell mesh: nodes: expected finite coordinates, got NaN or infinity")
+        freeze_mesh(self)
+        object.__setattr__(self, "lines", self.lines.reshape(-1, 2))
+        require_nodes("shell mesh", self.nodes, ShellError)
         for kind, cells in self.cells.items():
             if kind not in FLAT_TYPES:
                 raise ShellError(f"shell mesh: cells: expected types {', '.join(FLAT_TYPES)}, got {kind!r}")
             if cells.ndim != 2 or cells.shape[1] != len(kind.replace("triangle", "123").replace("quad", "1234")):
                 raise ShellError(f"shell mesh: {kind}: expected (n_cells, nodes per cell), got {cells.shape}")
-        for what, members, size in [
+        members = [
             *[(kind, cells, len(self.nodes)) for kind, cells in self.cells.items()],
             ("lines", self.lines, len(self.nodes)),
             *[(f"node set {g!r}", m, len(self.nodes)) for g, m in self.node_sets.items()],
@@ -106,9 +92,8 @@ class ShellMesh:
                 for g, by_type in self.cell_sets.items()
                 for kind, rows in by_type.items()
             ],
-        ]:
-            if members.size and (members.min() < 0 or members.max() >= size):
-                raise ShellError(f"shell mesh: {what}: expected 0..{size - 1}, got {members.min()}..{members.max()}")
+        ]
+        require_members("shell mesh", members, ShellError)
 
     @property
     def n_cells(self) -> int:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from cms.errors import EigenError
 from cms.linear_algebra.solvers.factorization import Factorization, Matrix, factorize, matrix_of, shifted_matrix
@@ -16,7 +17,6 @@ from cms.linear_algebra.solvers.shift_inverted import ArraySpace, Modes, ShiftIn
 from cms.linear_algebra.solvers.slepc_modes import SlepcSearch, search_on_ranks
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import ArgumentError
-from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 from fe_models.foundation.records import ArrayShape, checked_fields
 from fe_models.foundation.solver import Solver
 from fe_models.foundation.sparse.submatrix import PrincipalBlock
@@ -119,7 +119,7 @@ def eigenmodes(
     FactorizationError
         If K - shift M is singular.
     """
-    K, M = (A if isinstance(A, PrincipalBlock | SpreadMatrix) else matrix_of(A) for A in (K, M))
+    K, M = (matrix_of(A) if sp.issparse(A) else A for A in (K, M))
     n = K.shape[0]
     if K.shape != (n, n) or M.shape != (n, n):
         raise EigenError(f"eigenmodes: expected K and M of one square shape, got {K.shape} and {M.shape}")
@@ -146,7 +146,7 @@ def eigenmodes(
         kind: type[DenseSearch | KrylovSearch | SlepcSearch] = DenseSearch if is_dense else own_search or KrylovSearch
         if space is not None:
             stack.callback(space.close)
-        mass = M if space is not None or isinstance(M, SpreadMatrix) else matrix_of(M)
+        mass = M if space is not None or not isinstance(M, PrincipalBlock) else matrix_of(M)
         operator = ShiftInverted(mass, shift, factorization, tolerance, progress, space or ArraySpace(n, numbering))
         search = kind(operator, wanted)
         modes = search.modes(wanted)

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from cms.errors import FactorizationError
 from cms.linear_algebra.solvers.registry import solver_of
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.ranks.spread_matrix import SpreadMatrix, spread_sum, whole_matrix
+from fe_models.foundation.ranks.spread_matrix import spread_sum, whole_matrix
 from fe_models.foundation.solver import Factor, Solver
 from fe_models.foundation.sparse.submatrix import PrincipalBlock, principal_block, spread_block
 
@@ -42,7 +42,7 @@ def matrix_of(A: Matrix) -> sp.csc_array:
 def shifted_matrix(K: Matrix, M: Matrix, sigma: float) -> Matrix:
     """Return K - sigma M, (n, n): distributed if the blocks are, otherwise sparse."""
     if isinstance(K, PrincipalBlock) and isinstance(M, PrincipalBlock) and K.index is M.index:
-        if isinstance(K.A, SpreadMatrix) and isinstance(M.A, SpreadMatrix):
+        if not (sp.issparse(K.A) or sp.issparse(M.A)):
             return PrincipalBlock(spread_sum(K.A, M.A, -sigma), K.index)
     return sp.csc_array(matrix_of(K) - sigma * matrix_of(M))
 

@@ -7,6 +7,7 @@ factorisation.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy.linalg as la
@@ -21,7 +22,6 @@ from cms.modes.families.rigid_modes import rounding_of_energy, without_energy
 from fe_models.body.couplings.coupling_on_ranks import spread_extension
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 from fe_models.foundation.solver import Solver
 from fe_models.foundation.sparse.submatrix import PrincipalBlock, principal_block
 from fe_models.foundation.tall.columns import combine, inner, of_this_process
@@ -262,7 +262,7 @@ def _pivots(motions: Array) -> IntArray:
     return np.sort(pivots[:n]).astype(np.int64)
 
 
-def _boundary_entries(A: SpreadMatrix, fixed: FixedInterfaceBody, Z: Array) -> sp.csc_array:
+def _boundary_entries(A: Any, fixed: FixedInterfaceBody, Z: Array) -> sp.csc_array:
     """Return Tᵀ A T without its interior block, (n_i + n_z, n_i + n_z)."""
     n_i, n_z = len(fixed.i), Z.shape[1]
     A_z = sp.csc_array(A[:, fixed.b] @ sp.csc_array(Z))

@@ -24,7 +24,6 @@ from fe_models.body.rigid_motion import rigid_motion_of_dofs, rigid_motion_of_po
 from fe_models.errors import InterfaceError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
-from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 from fe_models.foundation.sparse.submatrix import principal_block
 
 __all__ = ["RoundSurface", "check_overlap", "couple", "mean_motion", "require_spread", "round_surface"]
@@ -257,7 +256,7 @@ def _congruence(
     """
     n_new = len(keep) + T_s.shape[1] + n_more
     new = _reference_entries(A, keep, slave_rows, T_s, n_new) if len(slave_rows) else None
-    if isinstance(A, SpreadMatrix):
+    if not sp.issparse(A):
         return spread_extension(A, keep, sum((B for B in (new, more) if B is not None), sp.csc_array((n_new, n_new))))
     A_kk = principal_block(A, keep)
     indptr = np.append(A_kk.indptr, np.full(n_new - len(keep), A_kk.indptr[-1], A_kk.indptr.dtype))  # empty columns

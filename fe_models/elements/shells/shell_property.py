@@ -10,6 +10,8 @@ from fe_models.body.material import (
     AnyMaterial,
     Material,
     OrthotropicMaterial,
+    cells_of_groups,
+    counts_of,
     groups_of,
     require_isotropic,
 )
@@ -17,7 +19,6 @@ from fe_models.errors import ShellError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.records import checked_fields
-from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.shell_mesh import ShellMesh
 
 __all__ = [
@@ -312,25 +313,15 @@ def assign_shell_properties(
     """
     if isinstance(properties, AnyShellProperty):
         return (properties,), {kind: np.zeros(len(cells), np.int64) for kind, cells in mesh.cells.items()}
-    used = tuple(dict.fromkeys(properties.values()))
-    number = {kind: np.full(len(cells), -1, np.int64) for kind, cells in mesh.cells.items()}
-    for group, item in properties.items():
-        if group not in mesh.cell_sets:
-            raise ShellError(f"shells: the mesh has no group of cells {quoted(group)}{nearest(group, mesh.cell_sets)}")
-        index = used.index(item)
-        for kind, rows in mesh.cell_sets[group].items():
-            taken = rows[(number[kind][rows] >= 0) & (number[kind][rows] != index)]
-            if taken.size:
-                raise ShellError(
-                    f"shells: {taken.size} {kind} cells of group {group!r} have two thicknesses or materials, first "
-                    f"{mesh.cell_name(kind, taken[0])}; make the groups disjoint"
-                )
-            number[kind][rows] = index
-    missing = {kind: np.flatnonzero(index < 0) for kind, index in number.items() if (index < 0).any()}
+
+    def clash(kind: str, row: int, *_: AnyShellProperty) -> str:
+        return f"two thicknesses or materials, first {mesh.cell_name(kind, row)}; make the groups disjoint"
+
+    used, number, missing = cells_of_groups("shells", mesh, properties, clash, ShellError)
     if missing:
-        counts = ", ".join(f"{rows.size} {kind}" for kind, rows in missing.items())
         raise ShellError(
-            f"shells: cells without a thickness: {counts}; {groups_of(mesh.cell_sets, missing, 'one')}; cells outside "
+            f"shells: cells without a thickness: {counts_of(missing)}; {groups_of(mesh.cell_sets, missing, 'one')}; "
+            "cells outside "
             "the body are left out by  "
             'read_shell_mesh(groups=...) or, in a job, accept = ["left-out"]'
         )

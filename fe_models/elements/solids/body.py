@@ -128,7 +128,7 @@ class SolidModel:
 
     def mass_gram(self, u: Any) -> Array:
         """Return ∫ a aᵀ dm with a = [1, c, u_x, u_y, u_z], (4 + 3 k, 4 + 3 k), exact; u is (3 n_nodes, k)."""
-        if isinstance(self.M_s, SpreadMatrix):
+        if not sp.issparse(self.M_s):
             return spread_mass_gram(self.M_s, self.mesh.nodes, u)
         n_nodes = len(self.mesh.nodes)
         return scalar_mass_gram(

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.ranks.spread_matrix import SpreadBlock, SpreadMatrix
+from fe_models.foundation.ranks.spread_matrix import SpreadBlock, whole_matrix
 from fe_models.foundation.tall.columns import elsewhere
 from fe_models.foundation.threads import in_threads
 
@@ -51,15 +51,12 @@ class PrincipalBlock:
 
 def spread_block(A: Any) -> SpreadBlock | None:
     """Return a submatrix distributed over ranks; None for other matrices, and for submatrices in another order."""
-    if isinstance(A, PrincipalBlock) and isinstance(A.A, SpreadMatrix):
-        return A.A.block(A.index)
-    return None
+    return A.A.block(A.index) if isinstance(A, PrincipalBlock) and not sp.issparse(A.A) else None
 
 
 def principal_block(A: sp.csc_array, index: IntArray) -> sp.csc_array:
     """Return A[index][:, index], (n, n), with sorted row indices; the index may have any order."""
-    if isinstance(A, SpreadMatrix):
-        A = A.whole()
+    A = whole_matrix(A)
     n = len(index)
     if n == A.shape[0] and (index[1:] > index[:-1]).all():
         return A
@@ -127,7 +124,7 @@ def nearby_order(A: sp.csc_array, dofs: IntArray, index: IntArray) -> IntArray:
     index
         Dofs to order, ascending, (n,).
     """
-    if isinstance(A, SpreadMatrix):
+    if not sp.issparse(A):
         return A.ordered(index)
     if len(index) < FEW_DOFS:
         return index
