@@ -129,10 +129,10 @@ def write_outputs(
 
 def picture_files(path: Path, pages: "Sequence[Figure]", dpi: int) -> dict[Path, bytes]:
     """Return the contents of one .pdf with all pages, or of a picture for each page: rod.png, rod-2.png, ..."""
-    from matplotlib.backends.backend_pdf import PdfPages
-
     ending = path.suffix.lower()
     if ending == ".pdf":
+        from matplotlib.backends.backend_pdf import PdfPages
+
         whole = io.BytesIO()
         with PdfPages(whole) as document:
             for page in pages:

@@ -13,7 +13,7 @@ from cms.assessment.rendering.scene import Scene, frame_of
 from cms.assessment.rendering.shape import colormap
 from fe_models.foundation.arrays import Array
 
-__all__ = ["Layout", "compose", "layout_of"]
+__all__ = ["Layout", "compose", "layout_of", "paper_of"]
 
 INK, FAINT, AXIS_COLORS = "#1f2a33", "#5b6770", ("#c8403a", "#3a9a4b", "#2f6fc4")
 
@@ -40,14 +40,12 @@ def layout_of(scene: Scene) -> Layout:
     return Layout((width, height), (unit, top, width - unit - right, height - top - bottom), unit)
 
 
-def compose(scene: Scene, layout: Layout, camera: Camera, view: Image, frame: int) -> Image:
-    """Return the finished picture, (height, width, 3) uint8: the view with all annotations."""
+def paper_of(scene: Scene, layout: Layout) -> Any:
+    """Return what all frames have around the view, as an image of PIL: title, captions and colour bar."""
     from PIL import Image as PilImage
     from PIL import ImageDraw
 
     image = PilImage.new("RGB", layout.size, scene.background)
-    left, top, width, height = layout.view
-    image.paste(PilImage.fromarray(view), (left, top))
     draw = ImageDraw.Draw(image)
     u = layout.unit
     y = u * 0.8
@@ -57,26 +55,52 @@ def compose(scene: Scene, layout: Layout, camera: Camera, view: Image, frame: in
     for caption in scene.captions:
         draw.text((1.4 * u, y), caption, FAINT, font=font(u))
         y += 1.35 * u
+    if scene.has_scalars:
+        draw_color_bar(draw, scene, layout)
+    return image
+
+
+def compose(scene: Scene, layout: Layout, camera: Camera, paper: Any, view: Image, frame: int) -> Image:
+    """Return the finished picture, (height, width, 3) uint8: the view on the paper, with annotations of the frame."""
+    from PIL import Image as PilImage
+    from PIL import ImageDraw
+
+    image = paper.copy()
+    left, top, width, height = layout.view
+    image.paste(PilImage.fromarray(view), (left, top))
+    draw = ImageDraw.Draw(image)
+    u = layout.unit
     if scene.frame_notes:
         middle = (left + width / 2, layout.size[1] - 1.1 * u)
         draw.text(middle, scene.frame_notes[frame], INK, anchor="mm", font=font(u))
     if scene.has_scalars:
-        draw_color_bar(draw, scene, layout)
+        draw_bar_title(draw, scene, layout)
     draw_triads(draw, scene, layout, camera, frame)
     corner = (left + 2.6 * u, top + height - 2.8 * u)
     draw_axes(draw, corner, camera.axes[:2] @ np.eye(3) * 2.1 * u, camera.axes[2], u, "xyz")
     return np.asarray(image)
 
 
-def draw_color_bar(draw: Any, scene: Scene, layout: Layout) -> None:
-    """Draw the colour bar with rounded numbers beside it."""
+def bar_of(layout: Layout) -> tuple[float, float, float]:
+    """Return left, top and height of the colour bar, in pixels."""
     u, (width, height) = layout.unit, layout.size
     _, top, _, view_height = layout.view
-    low, high = scene.color_limits
-    x, bar_height = width - 6.6 * u, min(0.62 * height, view_height - 5 * u)
-    y = top + (view_height - bar_height) / 2 + u
+    bar_height = min(0.62 * height, view_height - 5 * u)
+    return width - 6.6 * u, top + (view_height - bar_height) / 2 + u, bar_height
+
+
+def draw_bar_title(draw: Any, scene: Scene, layout: Layout) -> None:
+    """Draw the title of the colour bar, which may reach into the view."""
+    u = layout.unit
+    _, y, _ = bar_of(layout)
     title = scene.scalar_title + (f" [{scene.scalar_unit}]" if scene.scalar_unit else "")
-    draw.text((width - 1.2 * u, y - 1.7 * u), title, INK, anchor="rm", font=font(u))
+    draw.text((layout.size[0] - 1.2 * u, y - 1.7 * u), title, INK, anchor="rm", font=font(u))
+
+
+def draw_color_bar(draw: Any, scene: Scene, layout: Layout) -> None:
+    """Draw the colour bar with rounded numbers beside it."""
+    u, (low, high) = layout.unit, scene.color_limits
+    x, y, bar_height = bar_of(layout)
     colors = (colormap() * 255).round().astype(int)
     for row in range(round(bar_height)):
         color = tuple(colors[min(int(255.999 * (1 - row / bar_height)), 255)])

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from cms.assessment.rendering.annotations import compose, layout_of
+from cms.assessment.rendering.annotations import compose, layout_of, paper_of
 from cms.assessment.rendering.camera import Camera, fitted_camera
 from cms.assessment.rendering.film import Image, write_film, write_picture
 from cms.assessment.rendering.scene import Scene
@@ -28,7 +28,8 @@ def frames_of(scene: Scene, view_maker: ViewMaker, on_frame: OnFrame) -> Iterato
     """Yield the finished frames, (height, width, 3) uint8."""
     layout = layout_of(scene)
     camera = fitted_camera(scene, layout.view[2:])
+    paper = paper_of(scene, layout)
     draw = view_maker(scene, camera)
     for frame in range(scene.n_frames):
-        yield compose(scene, layout, camera, draw(frame), frame)
+        yield compose(scene, layout, camera, paper, draw(frame), frame)
         on_frame(frame + 1, scene.n_frames)

@@ -21,6 +21,7 @@ __all__ = ["pyvista_view"]
 
 OVERSAMPLING = 2  #: size of the drawing before averaging divided by the final size, which smooths edges
 EDGE_COLOR = "#212d38"
+FRONT = 1  #: the buffer of a window that is read
 
 Part = TypeVar("Part", Surface, Lines)
 
@@ -50,15 +51,27 @@ def pyvista_view(scene: Scene, camera: Camera) -> Callable[[int], Image]:
     view = plotter.camera
     view.position, view.focal_point, view.up = camera.eye, camera.focal_point, camera.axes[1]
     view.view_angle = VIEW_ANGLE
+    plotter.show(auto_close=False)
 
     def draw(frame: int) -> Image:
         for update in updates:
             update(frame)
         plotter.reset_camera_clipping_range()
         plotter.render()
-        return average_of_blocks(plotter.screenshot(return_img=True), OVERSAMPLING)
+        return average_of_blocks(pixels_of(plotter.render_window), OVERSAMPLING)[::-1]
 
     return draw
+
+
+def pixels_of(window: Any) -> Image:
+    """Return the pixels that a window has drawn, from its lowest row upwards, (height, width, 3) uint8."""
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
+
+    width, height = window.GetActualSize()
+    pixels = vtkUnsignedCharArray()
+    window.GetPixelData(0, 0, width - 1, height - 1, FRONT, pixels, 0)
+    return np.asarray(vtk_to_numpy(pixels)).reshape(height, width, 3)
 
 
 def look_of_surface(surface: Surface) -> Hashable:

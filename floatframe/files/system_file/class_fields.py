@@ -4,6 +4,7 @@ import inspect
 import re
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import cache
+from linecache import getlines
 from typing import Any, get_type_hints
 
 __all__ = ["ClassField", "class_fields", "summary_of"]
@@ -57,8 +58,12 @@ def meanings_of(kind: Any) -> dict[str, str]:
 
 
 def source_of(kind: Any) -> str:
-    """Return the source of a class, "" if there is none."""
+    """Return the source of a class, "" if there is none; `inspect.getsource` parses the whole module for each class."""
     try:
+        if isinstance(kind, type) and "." not in kind.__qualname__:
+            text = "".join(getlines(inspect.getsourcefile(kind) or ""))
+            if found := re.search(rf"^class {kind.__name__}\b.*\n(?:[ \t)].*\n|\n)*", text, re.MULTILINE):
+                return found[0]
         return inspect.getsource(kind)
     except (OSError, TypeError):
         return ""
