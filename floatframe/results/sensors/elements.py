@@ -54,9 +54,9 @@ def output_rows(placed: PlacedLaw, small: SmallMotions) -> Rows:
     parts = []
     for marker in placed.markers:
         place = small.place(marker, placed.element.name)
-        parts += [place.moved, place.rotation, small.velocity(place.moved), small.velocity(place.rotation)]
+        parts += [place.moved, place.rotation, place.velocity, place.omega]
         if placed.law.accelerations:
-            parts += [small.acceleration(place.moved), small.acceleration(place.rotation)]
+            parts += [place.acceleration, place.alpha]
     if unknown:
         parts.append(small.by_wrench(unknown))
     return joined(parts).mapped(slopes)

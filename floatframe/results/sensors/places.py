@@ -4,7 +4,7 @@ A point on a flexible body is an interface, a kept node (by number, or by positi
 of the nodes of an element or set.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -90,7 +90,7 @@ def small_place(small: SmallMotions, where: str, marker: Marker) -> SmallPlace:
     seen = node_shape(body.reduced, found.rows, is_stiffened=body.is_stiffened)
     axes = frame.axes @ seen.pose(small.now.body(body.name).q[0])[1]
     turns = is_turning(body.reduced, found.rows)
-    return SmallPlace(place.position, axes, place.moved, place.rotation if turns else frame.rotation)
+    return replace(place, axes=axes, rotation=place.rotation if turns else frame.rotation)
 
 
 def is_at_node(system: System, marker: Marker) -> bool:
@@ -196,7 +196,7 @@ class PlaceSensor:
                     f"{where}: a rotation vector relative to the ground grows without limit in a steady rotation and "
                     "is not linear about it; give relative_to = a body that rotates with the system"
                 )
-            rows = absolute_rows(small, small_place(small, f"{where}: marker", self.marker), self.quantity)
+            rows = absolute_rows(small_place(small, f"{where}: marker", self.marker), self.quantity)
         else:
             place = small_place(small, f"{where}: marker", self.marker)
             other = small_place(small, f"{where}: relative_to", self.relative_to)
@@ -208,16 +208,15 @@ class PlaceSensor:
         return vector_linear(rows, np.array([value[axis][0] for axis in "xyz"]), unit, least=least)
 
 
-def absolute_rows(small: SmallMotions, place: SmallPlace, quantity: str) -> Rows:
+def absolute_rows(place: SmallPlace, quantity: str) -> Rows:
     """Return three rows for a quantity of a point, in axes that rotate with the steady motion."""
-    if quantity == "rotation-vector":
-        return place.rotation.mapped(inverse_left_jacobian(place.axes))
-    if quantity == "angular-velocity":
-        return place.rotation.rate
-    rows = place.moved
-    if quantity in ("velocity", "acceleration"):
-        rows = small.velocity(rows)
-    return small.velocity(rows) if quantity == "acceleration" else rows
+    return {
+        "position": place.moved,
+        "velocity": place.velocity,
+        "acceleration": place.acceleration,
+        "rotation-vector": place.rotation.mapped(inverse_left_jacobian(place.axes)),
+        "angular-velocity": place.omega,
+    }[quantity]
 
 
 def inverse_left_jacobian(A: Array) -> Array:

@@ -3,8 +3,7 @@
 The unknowns are x = (xi, s). xi consists, for each body, of translation and rotation of its frame in body axes and its
 modal coordinates, in the frame in which the engine computes it. s are the motions prescribed by inputs, of bases (the
 ground side of connections) and of drives. All quantities are in axes that rotate with the steady motion and coincide
-with ground axes now. In these axes, a point p = p_0 + J x has the absolute velocity p' + Omega × p and the acceleration
-p'' + 2 Omega × p' + Omega × (Omega × p).
+with ground axes now. `SmallPlace` is the motion of a marker for all sensors and elements.
 """
 
 from collections.abc import Sequence
@@ -59,12 +58,43 @@ class InputForce:
 
 @dataclass(frozen=True, eq=False)
 class SmallPlace:
-    """A point with axes, and its linearised motion."""
+    """A point with axes, and its linearised motion in axes that rotate with the steady motion at Omega.
+
+    With p = p_0 + J x, and theta the rotation of the axes, the absolute motion is
+
+        velocity          p' + Omega × p       acceleration          (p' + Omega × p)' + Omega × (p' + Omega × p)
+        angular velocity  Omega + theta'       angular acceleration  theta'' + Omega × theta'
+    """
 
     position: Array  #: position of the point, ground axes, (3,)
     axes: Array  #: axes at the point as columns, (3, 3)
     moved: Rows  #: linearised translation of the point, as three rows
     rotation: Rows  #: linearised rotation of the axes in ground axes, as three rows
+    spin: Array  #: angular velocity Omega of the steady rotation, ground axes, (3,) [rad/s]
+
+    def absolute_rate(self, rows: Rows) -> Rows:
+        """Return the rate in ground axes of a vector with the given rows in rotating axes."""
+        return rows.rate + rows.mapped(tilde(self.spin))
+
+    @property
+    def velocity(self) -> Rows:
+        """The velocity of the point, three rows."""
+        return self.absolute_rate(self.moved)
+
+    @property
+    def acceleration(self) -> Rows:
+        """The acceleration of the point, three rows."""
+        return self.absolute_rate(self.velocity)
+
+    @property
+    def omega(self) -> Rows:
+        """The angular velocity of the axes, three rows."""
+        return self.rotation.rate
+
+    @property
+    def alpha(self) -> Rows:
+        """The angular acceleration of the axes, three rows."""
+        return self.absolute_rate(self.omega)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,14 +149,6 @@ class SmallMotions:
         zero = np.zeros((len(w), self.n_x))
         return Rows(zero, zero, zero, w)
 
-    def velocity(self, rows: Rows) -> Rows:
-        """Return rows of a point's absolute velocity from the rows of its translation."""
-        return rows.rate + rows.mapped(tilde(self.omega))
-
-    def acceleration(self, rows: Rows) -> Rows:
-        """Return rows of a point's absolute acceleration from the rows of its translation."""
-        return self.velocity(self.velocity(rows))
-
     def pose(self, end: MarkerData) -> tuple[Array, Array]:
         """Return position (3,) and axes (3, 3) of a marker, ground axes."""
         return marker_pose(end, self.state, n_q_of(self.system))
@@ -142,7 +164,7 @@ class SmallMotions:
                 if connection in base.moved:
                     x[:, self.n_u + k] = base.at(position)
         rows = self.by_motion(x)
-        return SmallPlace(position, axes, rows[:3], rows[3:])
+        return SmallPlace(position, axes, rows[:3], rows[3:], self.omega)
 
     def unknowns(self, body: int) -> slice:
         """Return the index range of a body's small motions."""
@@ -163,7 +185,7 @@ class SmallMotions:
     def frame_place(self, name: str) -> SmallPlace:
         """Return the linearised motion of a body's file frame."""
         rows, R = self.of_file(name)
-        return SmallPlace(self.now.body(name).r[0], R, rows[:3].mapped(R), rows[3:6].mapped(R))
+        return SmallPlace(self.now.body(name).r[0], R, rows[:3].mapped(R), rows[3:6].mapped(R), self.omega)
 
     def joint_coordinate(self, joint: str, coordinate: str, where: str) -> Rows:
         """Return one row with the change of a joint coordinate; `ModelError` with the closest name if missing."""

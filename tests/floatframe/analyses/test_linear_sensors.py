@@ -1,20 +1,23 @@
 """Sensors as outputs of a linearised system, against the equations of motion near by, statics and balances."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from numba import njit
 from numpy.testing import assert_allclose
 
 from floatframe import JointForce, Marker, PointForce, UserForce, linearize, static_equilibrium
 from floatframe.analyses import ParameterInput, campbell, steady_rotation
 from floatframe.errors import ModelError
 from floatframe.joints import JointCoordinate
+from floatframe.model.elements import Element, ElementLaw
 from floatframe.results.sensors.places import PLACE_QUANTITIES, TURNING
 from floatframe.sensors import (
     AngleSensor,
     Channel,
     DisplacementSensor,
+    ElementSensor,
     InterfaceForceSensor,
     PlaceSensor,
     ReactionSensor,
@@ -80,6 +83,32 @@ def test_columns_about_a_steady_rotation_are_those_of_motions_near_by():
     compare(system, about, linear, rotor_sensors(), size=4e-6, tolerance=2e-6)
     with pytest.raises(ModelError, match="not linear about it"):
         linearize(system, about, outputs=[PlaceSensor("turn", Marker("hub"), "rotation-vector")])
+
+
+@njit
+def shown_motion(t, x, z, lam, data, wrench, z_dot, g, outputs):
+    for k in range(12):
+        outputs[k] = x[0, 12 + k]
+
+
+@dataclass(frozen=True, eq=False)
+class ShownMotion(Element):
+    """A marker that shows its velocity, angular velocity and both accelerations."""
+
+    name: str
+    marker: Marker
+
+    def law(self, placed):
+        names = tuple(f"{what}{axis}" for what in ("v", "w", "a", "alpha") for axis in "xyz")
+        return ElementLaw(function=shown_motion, data=[], outputs=names, tangent="complex", accelerations=True)
+
+
+@pytest.mark.parametrize("marker", [Marker("ball", position=(0.1, 0.2, 0.3)), Marker("blade", "end_a")])
+def test_an_element_shows_absolute_rates_about_a_steady_rotation(marker):
+    """The ball and the blade tilt in their bushings: theta' is their angular velocity, without Omega × theta."""
+    system = replace(rotor(), elements=[ShownMotion("shown", marker)])
+    about, seen = steady_rotation(system, (0, 0, 2.0), tolerance=1e-12), [ElementSensor("seen", "shown")]
+    compare(system, about, linearize(system, about, outputs=seen), seen, size=4e-6, tolerance=2e-6)
 
 
 INPUTS = {
