@@ -4,8 +4,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -22,6 +21,7 @@ __all__ = ["demo_command", "run_demo"]
 
 JOBS = ("rod.toml", "crank.toml")  #: job files included in this package
 MODE = 3
+RUN_LATER = "floatframe.cli.run_later"  #: module that compiles kernels and runs a command when it is signalled
 FPS = 15  #: frames per second of the film of the motion, which lasts 8 s; drawing it takes most of the time
 
 
@@ -48,33 +48,36 @@ def run_demo(folder: Path) -> None:
     """
     began = time.perf_counter()
     put_inputs(folder)
-    with kernels_compiled_beside() as wait_for_kernels:
-        run_steps(folder, wait_for_kernels)
+    run_steps(folder)
     list_files(folder)
     say(f"{time.perf_counter() - began:.0f} s; change rod.toml or crank.toml and run the commands above in {folder}")
 
 
-def run_steps(folder: Path, wait_for_kernels: Callable[[], None]) -> None:
-    """Run every command, each announced; independent commands run at the same time."""
+def run_steps(folder: Path) -> None:
+    """Run every command, each announced; independent commands run at the same time.
+
+    The process of the motion compiles its kernels during the reduction, which takes half a minute on a new machine.
+    """
     from cms.cli.info import info_command, info_record
     from cms.cli.reduce import reduce_command
     from fe_models.foundation.parametric_file import schemas_named_in
     from fe_models.foundation.paths import replace_file, replace_files
 
     modal = folder / "rod.h5"
-    announce(folder, "cms reduce rod.toml -o rod.h5")
-    reduce_command([folder / "rod.toml"], modal)
     with ExitStack() as running:
+        run = begun(running, folder, "floatframe run crank.toml -o crank.h5", RUN_LATER)
+        announce(folder, "cms reduce rod.toml -o rod.h5")
+        reduce_command([folder / "rod.toml"], modal)
+        run.signal()
         view = begun(running, folder, f"cms view rod.h5 --mode {MODE} -o m{MODE}.png --animate m{MODE}.gif")
         announce(folder, "cms info rod.h5")
         info_command(modal)
         announce(folder, "cms info rod.h5 --json > rod.json")
         replace_file(folder / "rod.json", info_record(modal).encode("utf-8"))
-        wait_for_kernels()
-        run = begun(running, folder, "floatframe run crank.toml -o crank.h5")
         schemas = schemas_named_in((folder / name).read_bytes() for name in JOBS)  # seconds, during the run
         replace_files({folder / name: content for name, content in schemas.items()})
-        run.worker.wait()
+        with stages() as clock, clock("run; its kernels are compiled once on a machine"):
+            run.worker.wait()
         later = [
             begun(running, folder, words)
             for words in (
@@ -95,17 +98,24 @@ class Begun:
     worker: subprocess.Popen[bytes]
     said: IO[bytes]
 
+    def signal(self) -> None:
+        """Let the command of a process of `RUN_LATER` run."""
+        assert self.worker.stdin is not None  # the pipe was opened with the process
+        with suppress(BrokenPipeError), self.worker.stdin as pipe:  # if the process has ended, `finish` shows why
+            pipe.write(b"run\n")
 
-def begun(running: ExitStack, folder: Path, words: str) -> Begun:
+
+def begun(running: ExitStack, folder: Path, words: str, module: str = "") -> Begun:
     """Start a command, `cms ...` or `floatframe ...`, in the folder as a user does; the stack terminates it.
 
-    Apart from this, the package does not know `floatframe`.
+    A module other than the command line of the program gets its arguments. Apart from this, the package does not know
+    `floatframe`.
     """
     program, *arguments = words.split()
     said = running.enter_context(TemporaryFile())
     worker = subprocess.Popen(
-        [sys.executable, "-P", "-m", f"{program}.cli", *arguments], cwd=folder, env=environment(),
-        stdin=subprocess.DEVNULL, stdout=said, stderr=subprocess.STDOUT,
+        [sys.executable, "-P", "-m", module or f"{program}.cli", *arguments], cwd=folder, env=environment(),
+        stdin=subprocess.PIPE if module else subprocess.DEVNULL, stdout=said, stderr=subprocess.STDOUT,
     )  # fmt: skip
     running.callback(ended, worker)
     return Begun(words, worker, said)
@@ -130,6 +140,8 @@ def finish(folder: Path, command: Begun) -> None:
 
 def ended(worker: subprocess.Popen[bytes]) -> None:
     """Terminate a process that is still running."""
+    if worker.stdin is not None:
+        worker.stdin.close()
     worker.kill()
     worker.wait()
 
@@ -159,28 +171,6 @@ def list_files(folder: Path) -> None:
     typer.echo()
     rows = [(str(folder / name), size_words((folder / name).stat().st_size), words) for name, words in made.items()]
     print_table("Files of the demo", ("file", "size>", "what it is"), rows)
-
-
-@contextmanager
-def kernels_compiled_beside() -> Iterator[Callable[[], None]]:
-    """Compile the kernels of the motion in another process, if necessary; yield the function that waits for it.
-
-    It takes a minute on a new machine, in parallel with the other steps. If it fails, the run compiles them itself.
-    """
-    worker = subprocess.Popen(
-        [sys.executable, "-P", "-m", "floatframe.cli.compile_kernels"], env=environment(),
-        stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-    )  # fmt: skip
-
-    def wait() -> None:
-        if worker.poll() is None:
-            with stages() as clock, clock("compile the kernels, once on a machine"):
-                worker.wait()
-
-    try:
-        yield wait
-    finally:
-        ended(worker)
 
 
 def put_inputs(folder: Path) -> None:

@@ -381,12 +381,24 @@ def test_the_demo_runs_the_whole_line_and_lists_its_files(tmp_path, monkeypatch)
     def blank(*arguments, **_):
         next(a for a in arguments if isinstance(a, Path)).write_bytes(b"")
 
-    def begun_here(running, folder, words):
+    class Signal(io.BytesIO):
+        def write(self, line):
+            self.run()
+
+    def begun_here(running, folder, words, module=""):
         program, *arguments = words.split()
-        with contextlib.chdir(folder):
-            done = CliRunner().invoke({"cms": app, "floatframe": floatframe_app}[program], arguments)
-        assert done.exit_code == 0, done.output
-        return demo.Begun(words, SimpleNamespace(returncode=0, wait=lambda: 0), io.BytesIO(done.output.encode()))
+        said, signal = io.BytesIO(), Signal()
+
+        def run():
+            with contextlib.chdir(folder):
+                done = CliRunner().invoke({"cms": app, "floatframe": floatframe_app}[program], arguments)
+            assert done.exit_code == 0, done.output
+            said.write(done.output.encode())
+
+        signal.run = run
+        if not module:
+            run()
+        return demo.Begun(words, SimpleNamespace(returncode=0, wait=lambda: 0, stdin=signal), said)
 
     for name in (
         "cms.assessment.report.view.view_mode", "cms.assessment.report.view.animate_mode",
@@ -395,7 +407,6 @@ def test_the_demo_runs_the_whole_line_and_lists_its_files(tmp_path, monkeypatch)
         monkeypatch.setattr(name, blank)
     monkeypatch.setattr("floatframe.pictures.overview.overview_pages", lambda *_: Figure())
     monkeypatch.setattr(demo, "begun", begun_here)
-    monkeypatch.setattr(demo, "kernels_compiled_beside", lambda: contextlib.nullcontext(lambda: None))
     assert_demo_makes_its_files(tmp_path, monkeypatch)
 
 

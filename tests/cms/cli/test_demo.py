@@ -30,19 +30,27 @@ def test_a_job_that_the_user_has_changed_is_not_overwritten(name, tmp_path):
     assert not (tmp_path / "rod.msh").exists()
 
 
-def test_an_error_on_the_way_ends_the_process_that_compiles(monkeypatch):
+def test_an_error_of_the_reduction_ends_the_process_that_compiles(monkeypatch, tmp_path):
     started = []
     popen = demo.subprocess.Popen
     command = [sys.executable, "-c", "import time; time.sleep(600)"]
     monkeypatch.setattr(demo.subprocess, "Popen", lambda _, **k: started.append(popen(command, **k)) or started[0])
-
-    def fail():
-        with demo.kernels_compiled_beside():
-            raise JobError("no")
-
-    with pytest.raises(JobError, match="no"):
-        fail()
+    with pytest.raises(typer.Exit):
+        demo.run_steps(tmp_path)  # without its inputs
     assert started[0].returncode is not None
+
+
+@pytest.mark.parametrize("is_signalled", [True, False])
+def test_a_later_command_runs_at_its_signal_alone(is_signalled, tmp_path):
+    with ExitStack() as running:
+        later = demo.begun(running, tmp_path, "floatframe --version", demo.RUN_LATER)
+        if is_signalled:
+            later.signal()
+        else:
+            later.worker.stdin.close()
+        assert later.worker.wait() == 0
+        later.said.seek(0)
+        assert later.said.read().startswith(b"floatframe") == is_signalled
 
 
 def test_the_compiling_process_compiles(monkeypatch, tmp_path):
