@@ -236,7 +236,7 @@ class ResultsWriter:
     def begin(self) -> None:
         """Remove everything from the folder of segments except its head."""
         self.place.clear()
-        self.write_file(self.folder / "head.h5", lambda file: self.write_head(file, is_complete=False))
+        self.write_file(self.folder / "head.h5", self.write_head)
 
     def go_on(self) -> None:
         """Remove the segments after the last restart record, because they will be computed again."""
@@ -260,10 +260,10 @@ class ResultsWriter:
         """Write a file under a temporary name, then move it to its final name."""
         write_sealed_file(path, KIND, fill, part=path.with_name(path.name + UNFINISHED))
 
-    def write_head(self, file: h5py.File, *, is_complete: bool) -> None:
+    def write_head(self, file: h5py.File) -> None:
         """Write a file that contains only the head."""
         manifest = Manifest(file)
-        manifest.attributes("/", self.attributes(is_complete=is_complete))
+        manifest.attributes("/", self.attributes(is_complete=False))
         manifest.close()
 
     def attributes(self, *, is_complete: bool) -> dict[str, str | int]:

@@ -69,11 +69,11 @@ def response_error_chart(comparison: Comparison) -> Chart:
     return Chart(Axis("frequency [Hz]"), (upwards,), tuple(lines))
 
 
-def deformation_chart(comparison: Comparison, norm: str = "K") -> Chart:
+def deformation_chart(comparison: Comparison) -> Chart:
     """Return the chart of the deformation error over time for every set at its shown point, with the force."""
     full = comparison.full
     t = full.t * 1e3
-    lines = curves(comparison, t, lambda p: np.maximum(p.record("deformation-error").data["error"][norm], FLOOR))
+    lines = curves(comparison, t, lambda p: np.maximum(p.record("deformation-error").data["error"]["K"], FLOOR))
     tolerance = LIMITS["deformation-error"].tolerance
     largest = [float(np.max(line.y)) for line in lines] + [tolerance or 1.0]
     upwards = log_axis("deformation error \u03b5(t) [-]", [], [min(largest) / 100, max(largest)])

@@ -93,16 +93,11 @@ def all_nodes(body: ReducedBody) -> NodeList:
     )
 
 
-def user_numbers(body: ReducedBody, n_more: int = 0, *, most: int = MOST) -> tuple[IntArray, tuple[str, ...]]:
+def user_numbers(body: ReducedBody, n_more: int = 0) -> tuple[IntArray, tuple[str, ...]]:
     """Return numbers for the kept nodes and for n_more further points, and notes about their origin.
 
     These are the user's numbers if they are unique; nodes without number (reference points) get the next numbers after
     the largest. Otherwise the numbers are 1, 2, ..., and a note says so.
-
-    Parameters
-    ----------
-    most
-        Largest number that the format can hold.
     """
     n = len(body.nodes)
     own = body.numbering.nodes
@@ -115,8 +110,8 @@ def user_numbers(body: ReducedBody, n_more: int = 0, *, most: int = MOST) -> tup
         why = "instances" if body.numbering.instances else "nodes and the points of their skin"
         return plain, (f"nodes are numbered 1, 2, ..., because {why} share numbers of the mesh",)
     n_free = int((~is_named).sum()) + n_more
-    if not len(named) or named.min() < 1 or named.max() + n_free > most:
-        return plain, (f"nodes are numbered 1, 2, ..., because mesh numbers are not within 1 to {most - n_free}",)
+    if not len(named) or named.min() < 1 or named.max() + n_free > MOST:
+        return plain, (f"nodes are numbered 1, 2, ..., because mesh numbers are not within 1 to {MOST - n_free}",)
     numbers = np.concatenate([own, np.full(n_more, NONE)])
     numbers[numbers == NONE] = named.max() + 1 + np.arange(n_free)
     return numbers, ("numbers of nodes are those of the mesh",)

@@ -11,6 +11,7 @@ import numpy as np
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.formats import Format
+from fe_models.foundation.words import shortened
 
 __all__ = ["CONTENT", "Request", "Writer", "WrittenFiles", "in_ascii", "left_out"]
 
@@ -101,12 +102,12 @@ def left_out(body: ReducedBody, content: Iterable[str]) -> tuple[str, ...]:
     return tuple(words for key, (words, has) in CONTENT.items() if key not in held and has(body))
 
 
-def in_ascii(text: str, longest: int = 200) -> str:
+def in_ascii(text: str) -> str:
     """Return a text as one line of ASCII; letters lose their accents."""
     line = " ".join(text.split()).translate(IN_ASCII)
     line = "".join(letter for letter in normalize("NFKD", line) if not combining(letter)).translate(IN_ASCII)
     line = line.encode("ascii", "replace").decode("ascii")
-    return line if len(line) <= longest else f"{line[: longest - 3]}..."
+    return shortened(line, 200)
 
 
 def own_version() -> str:

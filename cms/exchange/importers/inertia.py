@@ -191,14 +191,14 @@ def gram_of_mesh(inertia: MeshMass, shapes: Shapes, places: Mapping[int, Array],
     return body.element_model.mass_gram(shapes(dofs_of(numbers, 3)))
 
 
-def moments_in_frame(gram: Array, frame: BodyFrame, missing: tuple[str, ...] = ()) -> Moments:
+def moments_in_frame(gram: Array, frame: BodyFrame) -> Moments:
     """Return the moments in B from a Gram matrix ∫ a aᵀ in basic axes about their origin: c_B = axesᵀ (c - origin)."""
     n = (len(gram) - 4) // 3
     L = np.zeros((4 + 3 * n, 4 + 3 * n))
     L[0, 0] = 1.0
     L[1:4, 0], L[1:4, 1:4] = -frame.axes.T @ frame.origin, frame.axes.T
     L[4:, 4:] = np.kron(frame.axes.T, np.eye(n))
-    return moments_from_gram(L @ gram @ L.T, missing=missing)
+    return moments_from_gram(L @ gram @ L.T)
 
 
 def completed(known: Moments, other: Moments, what: str) -> tuple[Moments, str]:

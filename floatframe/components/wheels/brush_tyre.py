@@ -1,15 +1,12 @@
 """The brush tyre, with bristles, parabolic pressure and friction."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numba import njit
 
 from fe_models.foundation.arrays import GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
-from fe_models.foundation.units import SPEED, TIME, Quantity
 from floatframe.components.wheels.contact import (
     COMMON,
     LOW_SPEED,
@@ -23,17 +20,20 @@ from floatframe.components.wheels.contact import (
     put_wrenches,
     touching,
 )
-from floatframe.components.wheels.looks import tyre_looks
 from floatframe.components.wheels.numbers import tyre_law, tyre_numbers
 from floatframe.components.wheels.outputs import show, show_energy
-from floatframe.components.wheels.reading import Read, tyre_of_table
 from floatframe.components.wheels.roads.road import FlatRoad, Road
 from floatframe.components.wheels.slip import direction, hold_tread, tread_slip
-from floatframe.components.wheels.tyre_fields import check_common, common_numbers
+from floatframe.components.wheels.tyre_fields import (
+    DEFAULT_LOW_SPEED,
+    SETTLING_TIME,
+    SimpleTyre,
+    check_common,
+    common_numbers,
+)
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
-from floatframe.model.elements import Element, ElementLaw, Placed
-from floatframe.model.shapes import Arrow, MarkerShapes
+from floatframe.model.elements import ElementLaw, Placed
 
 __all__ = ["BrushTyre", "brush_law", "brush_law_at_rest"]
 
@@ -107,14 +107,10 @@ def brush_law_at_rest(t, x, z, lam, data, wrench, z_dot, g, outputs):
 # brush tyre -----------------------------------------------------------------------------------------------------------
 
 
-DEFAULT_LOW_SPEED = Quantity(1.0, SPEED)
-SETTLING_TIME = Quantity(0.02, TIME)
-
-
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class BrushTyre(Element):
+class BrushTyre(SimpleTyre):
     """A brush tyre, defined by slip stiffness, contact length and friction; it includes combined slip.
 
     The contact length is proportional to the square root of the load. The slip stiffness therefore increases with the
@@ -147,15 +143,6 @@ class BrushTyre(Element):
     def __post_init__(self) -> None:
         positive = ("nominal_load", "slip_stiffness", "contact_length", "friction")
         check_common(self, positive, ("rolling_resistance", "flattening"))
-
-    @classmethod
-    def from_table(cls, name: str, table: Mapping[str, Any], read: Read) -> "BrushTyre":
-        """Return the tyre of [elements.NAME]."""
-        return tyre_of_table(name, table, read, cls)
-
-    def drawn(self) -> tuple[MarkerShapes | Arrow, ...]:
-        """Return the drawn wheel, road and force."""
-        return tyre_looks(self.radius, self.axis, self.road)
 
     def law(self, placed: Placed) -> ElementLaw:
         """Return the element law for the markers in the assembled position."""

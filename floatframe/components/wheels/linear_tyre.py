@@ -1,15 +1,12 @@
 """The linear tyre, whose forces are proportional to slip."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numba import njit
 
 from fe_models.foundation.arrays import GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
-from fe_models.foundation.units import SPEED, TIME, Quantity
 from floatframe.components.wheels.contact import (
     COMMON,
     LOW_SPEED,
@@ -23,17 +20,20 @@ from floatframe.components.wheels.contact import (
     put_wrenches,
     touching,
 )
-from floatframe.components.wheels.looks import tyre_looks
 from floatframe.components.wheels.numbers import tyre_law, tyre_numbers
 from floatframe.components.wheels.outputs import show, show_energy
-from floatframe.components.wheels.reading import Read, tyre_of_table
 from floatframe.components.wheels.roads.road import FlatRoad, Road
 from floatframe.components.wheels.slip import direction, hold_tread, tread_slip
-from floatframe.components.wheels.tyre_fields import check_common, common_numbers
+from floatframe.components.wheels.tyre_fields import (
+    DEFAULT_LOW_SPEED,
+    SETTLING_TIME,
+    SimpleTyre,
+    check_common,
+    common_numbers,
+)
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
-from floatframe.model.elements import Element, ElementLaw, Placed
-from floatframe.model.shapes import Arrow, MarkerShapes
+from floatframe.model.elements import ElementLaw, Placed
 
 __all__ = ["LinearTyre", "linear_law", "linear_law_at_rest"]
 
@@ -103,14 +103,10 @@ def linear_law_at_rest(t, x, z, lam, data, wrench, z_dot, g, outputs):
 # linear tyre ----------------------------------------------------------------------------------------------------------
 
 
-DEFAULT_LOW_SPEED = Quantity(1.0, SPEED)
-SETTLING_TIME = Quantity(0.02, TIME)
-
-
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class LinearTyre(Element):
+class LinearTyre(SimpleTyre):
     """A tyre with forces proportional to slip, limited by friction, as in linear vehicle dynamics.
 
     Marker A lies on the road, with z up. Marker B is at the wheel centre, on the spinning body. All lengths, forces and
@@ -143,15 +139,6 @@ class LinearTyre(Element):
     def __post_init__(self) -> None:
         positive = ("slip_stiffness", "cornering_stiffness", "friction")
         check_common(self, positive, ("trail", "rolling_resistance", "flattening"), ("camber_stiffness",))
-
-    @classmethod
-    def from_table(cls, name: str, table: Mapping[str, Any], read: Read) -> "LinearTyre":
-        """Return the tyre of [elements.NAME]."""
-        return tyre_of_table(name, table, read, cls)
-
-    def drawn(self) -> tuple[MarkerShapes | Arrow, ...]:
-        """Return the drawn wheel, road and force."""
-        return tyre_looks(self.radius, self.axis, self.road)
 
     def law(self, placed: Placed) -> ElementLaw:
         """Return the element law for the markers in the assembled position."""

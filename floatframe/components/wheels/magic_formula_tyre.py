@@ -10,7 +10,7 @@ from numba.extending import register_jitable
 
 from fe_models.foundation.arrays import GivenArray, given
 from fe_models.foundation.records import checked_fields, frozen_copies
-from fe_models.foundation.units import TIME, UNIT_SYSTEMS, Dimensions, Quantity, Units
+from fe_models.foundation.units import UNIT_SYSTEMS, Dimensions, Units
 from floatframe.components.wheels.coefficients import COEFFICIENTS, NEEDED_COMBINED
 from floatframe.components.wheels.contact import (
     LOW_SPEED,
@@ -75,7 +75,7 @@ from floatframe.components.wheels.outputs import show, show_energy
 from floatframe.components.wheels.reading import Read, properties_of_table, tyre_of_table
 from floatframe.components.wheels.roads.road import FlatRoad, Road
 from floatframe.components.wheels.slip import direction, hold_tread, tread_slip
-from floatframe.components.wheels.tyre_fields import check_road, landing_depth
+from floatframe.components.wheels.tyre_fields import SETTLING_TIME, check_road, landing_depth
 from floatframe.components.wheels.tyre_file import TyreProperties
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
@@ -198,8 +198,6 @@ def magic_formula_law_at_rest(t, x, z, lam, data, wrench, z_dot, g, outputs):
 
 # magic formula tyre ---------------------------------------------------------------------------------------------------
 
-
-SETTLING_TIME = Quantity(0.02, TIME)
 
 CONVENTIONS = {"iso": 1.0, "adapted-sae": -1.0}
 SIDES = ("left", "right")

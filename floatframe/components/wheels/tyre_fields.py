@@ -1,17 +1,47 @@
-"""Validation of the fields that all tyres share."""
+"""The fields that all tyres share."""
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Self
 
-from floatframe.components.wheels.roads.road import FlatRoad, GridRoad
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.units import SPEED, TIME, Quantity
+from floatframe.components.wheels.looks import tyre_looks
+from floatframe.components.wheels.reading import Read, tyre_of_table
+from floatframe.components.wheels.roads.road import FlatRoad, GridRoad, Road
 from floatframe.errors import ModelError
 from floatframe.model.checked_values import number, unit_vector
+from floatframe.model.elements import Element
+from floatframe.model.shapes import Arrow, MarkerShapes
 
-__all__ = ["check_common", "check_road", "common_numbers", "landing_depth"]
+__all__ = [
+    "DEFAULT_LOW_SPEED", "SETTLING_TIME", "SimpleTyre", "check_common", "check_road", "common_numbers", "landing_depth",
+]  # fmt: skip
 
 #: steepest slope on which a wheel can follow the ground itself; an envelope is required for steeper ground
 STEEPEST = 1.0
 LANDINGS = 500  #: ratio of the radius to the landing depth
 FIT = 1e-6  #: relative difference between the radii of wheel and envelope that counts as rounding
+
+
+DEFAULT_LOW_SPEED = Quantity(1.0, SPEED)
+SETTLING_TIME = Quantity(0.02, TIME)
+
+
+class SimpleTyre(Element):
+    """A tyre whose fields are the keys of its table."""
+
+    radius: float
+    axis: Array
+    road: Road
+
+    @classmethod
+    def from_table(cls, name: str, table: Mapping[str, Any], read: Read) -> Self:
+        """Return the tyre of [elements.NAME]."""
+        return tyre_of_table(name, table, read, cls)
+
+    def drawn(self) -> tuple[MarkerShapes | Arrow, ...]:
+        """Return the drawn wheel, road and force."""
+        return tyre_looks(self.radius, self.axis, self.road)
 
 
 def check_common(

@@ -58,7 +58,7 @@ def casadi_files(routine: Routine, notes: Sequence[str]) -> dict[str, str]:
 
 def matlab_files(routine: Routine, notes: Sequence[str]) -> dict[str, str]:
     """Return NAME.m with the function NAME(inputs)."""
-    lines = lines_of(routine, symbol=lambda name: with_subscript(name, 1, "()"))
+    lines = lines_of(routine, symbol=with_subscript)
     outs = ", ".join(output.name for output in routine.outputs)
     head = f"function [{outs}] = {routine.name}({', '.join(name for name, _, _ in routine.inputs)})\n"
     body = [f"  {name} = {text};" for name, text in lines.named]

@@ -58,7 +58,7 @@ class Element:
         return [child for child in self.children if child.tag == tag]
 
 
-def read_xml(path: Path, root: str) -> Element:
+def read_xml(path: Path) -> Element:
     """Return the XML tree of a file.
 
     Raises
@@ -76,8 +76,8 @@ def read_xml(path: Path, root: str) -> Element:
     except OSError as error:
         raise UrdfError(f"{path}: cannot be read: {error.strerror}") from error
     tree = parsed(path, content)
-    if tree.tag != root:
-        raise UrdfError(f"{path}, line {tree.line}: expected <{root}> as first element, got <{shortened(tree.tag)}>")
+    if tree.tag != "robot":
+        raise UrdfError(f"{path}, line {tree.line}: expected <robot> as first element, got <{shortened(tree.tag)}>")
     return tree
 
 
@@ -156,7 +156,7 @@ class Reader:
 
     def robot(self) -> Robot:
         """Return the robot in the file."""
-        top = read_xml(self.path, "robot")
+        top = read_xml(self.path)
         self.refuse_macros(top)
         for element in top.all("material"):
             color = self.color(element)

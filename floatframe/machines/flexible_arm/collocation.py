@@ -70,10 +70,10 @@ class OptimalMove:
         return between(self.t, np.column_stack(cubics), (x[0],), (x[-1],))
 
 
-def casadi_function(system: System, what: str) -> Callable[..., Any]:
+def casadi_function(system: System) -> Callable[..., Any]:
     """Return generated equations of a system as a `casadi.Function`, see `generate`."""
     extra_module("casadi", extra="casadi", purpose="optimal moves")
-    code = generate(system, what=what, language="casadi", name=f"generated_{what}")
+    code = generate(system, what="residual", language="casadi", name="generated_residual")
     space: dict = {}
     exec(code.files[f"{code.name}.py"], space)
     made: Callable[..., Any] = space[code.name]()
@@ -123,7 +123,7 @@ def optimal_move(
     if model.n_z != model.n_rates:
         raise ModelError("optimal_move: expected coordinates with as many positions as rates (no Euler parameters)")
     casadi = extra_module("casadi", extra="casadi", purpose="optimal moves")
-    residual = casadi_function(system, "residual")
+    residual = casadi_function(system)
     n, n_u, h = model.n_z, len(driven), duration / n_intervals
     begin, end = model.positions()[0], model.positions()[0]
     for name, value in target.items():

@@ -10,9 +10,11 @@ from fe_models.foundation.arrays import Array
 from floatframe.errors import ModelError
 from floatframe.model.checked_values import rotation_of, unit_vector
 from floatframe.model.functions.time_functions import TimeFunction, constant
+from floatframe.model.joints.joint import Joint
 from floatframe.model.rotations import cross
 
 __all__ = [
+    "AxisJoint",
     "GivenMotions",
     "axis_in_b",
     "checked_axes",
@@ -61,6 +63,14 @@ def checked_rotation(joint: Any) -> None:
     """Make `rotation` of a joint orthonormal to roundoff, if it is given; raise `ModelError` if it is no rotation."""
     if joint.rotation is not None:
         object.__setattr__(joint, "rotation", rotation_of(f"joint {joint.name!r}: rotation", joint.rotation))
+
+
+class AxisJoint(Joint):
+    """A joint about or along an axis, with motions."""
+
+    def __post_init__(self) -> None:
+        checked_axes(self)
+        checked_motions(self)
 
 
 if TYPE_CHECKING:

@@ -14,6 +14,7 @@ from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Place
 from floatframe.model.checked_values import number
 from floatframe.model.joints.axis_frame import (
+    AxisJoint,
     GivenMotions,
     axis_in_b,
     checked_axes,
@@ -53,7 +54,7 @@ __all__ = ["CylindricalJoint", "PlanarJoint", "PrismaticJoint", "RevoluteJoint",
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class RevoluteJoint(Joint):
+class RevoluteJoint(AxisJoint):
     """Allows one rotation between two markers, about an axis; five constraints.
 
     The axis is given in the axes of marker A (the ground axes, if A is on the ground with the default triad). On B it
@@ -85,10 +86,6 @@ class RevoluteJoint(Joint):
     moment_b = MOMENT  #: index at which the moment on B starts in the wrench
     coordinates = ("angle",)
 
-    def __post_init__(self) -> None:
-        checked_axes(self)
-        checked_motions(self)
-
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
         """Return the rows for the assembled axes of the markers, (3, 3), and d = r_B - r_A, (3,), in ground axes."""
         axis_b = axis_in_b(self.axis, self.axis_b, A_a, A_b)
@@ -107,7 +104,7 @@ class RevoluteJoint(Joint):
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class PrismaticJoint(Joint):
+class PrismaticJoint(AxisJoint):
     """Lets marker B slide along an axis of marker A without rotation; five constraints.
 
     The point of B stays on the line through the point of A. The fixed orientation is that of the assembled bodies.
@@ -134,10 +131,6 @@ class PrismaticJoint(Joint):
     size = 9  #: components of the unknown wrench
     moment_b = MOMENT_B  #: index at which the moment on B starts in the wrench
     coordinates = ("distance",)
-
-    def __post_init__(self) -> None:
-        checked_axes(self)
-        checked_motions(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
         """Return the rows for the assembled axes of the markers, (3, 3), and d = r_B - r_A, (3,), in ground axes."""
@@ -241,7 +234,7 @@ class ScrewJoint(Joint):
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class CylindricalJoint(Joint):
+class CylindricalJoint(AxisJoint):
     """Lets marker B slide along an axis and rotate about it; four constraints.
 
     The point of B stays on the line through the point of A. Coordinates: `distance` between the points along the axis;
@@ -271,10 +264,6 @@ class CylindricalJoint(Joint):
     size = 9  #: components of the unknown wrench
     moment_b = MOMENT_B  #: index at which the moment on B starts in the wrench
     coordinates = ("distance", "angle")
-
-    def __post_init__(self) -> None:
-        checked_axes(self)
-        checked_motions(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
         """Return the rows for the assembled axes of the markers, (3, 3), and d = r_B - r_A, (3,), in ground axes."""
@@ -332,7 +321,7 @@ class SphericalJoint(Joint):
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class PlanarJoint(Joint):
+class PlanarJoint(AxisJoint):
     """Keeps the point of marker B in a plane of marker A, with parallel normals; three constraints.
 
     Coordinates: `first` and `second`, the position of the point of B in the plane along the two directions of
@@ -362,10 +351,6 @@ class PlanarJoint(Joint):
     size = 9  #: components of the unknown wrench
     moment_b = MOMENT_B  #: index at which the moment on B starts in the wrench
     coordinates = ("first", "second", "angle")
-
-    def __post_init__(self) -> None:
-        checked_axes(self)
-        checked_motions(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
         """Return the rows for the assembled axes of the markers, (3, 3), and d = r_B - r_A, (3,), in ground axes."""

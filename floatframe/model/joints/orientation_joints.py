@@ -12,10 +12,10 @@ from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Place
 from floatframe.model.joints.axis_frame import (
+    AxisJoint,
     GivenMotions,
     axis_in_b,
     checked_axes,
-    checked_motions,
     checked_rotation,
     given_motions,
     normals_of,
@@ -127,7 +127,7 @@ class ConstantOrientation(Joint):
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class UniversalJoint(Joint):
+class UniversalJoint(AxisJoint):
     """Joins two points, and keeps an axis of marker A normal to an axis of marker B; four constraints.
 
     Coordinates, zero as assembled: `angle` of the cross about the axis of A; `angle_b` of B relative to the cross about
@@ -157,10 +157,6 @@ class UniversalJoint(Joint):
     size = 6  #: components of the unknown wrench
     moment_b = MOMENT  #: index at which the moment on B starts in the wrench
     coordinates = ("angle", "angle_b")
-
-    def __post_init__(self) -> None:
-        checked_axes(self)
-        checked_motions(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
         """Return the rows for the assembled axes of the markers, (3, 3), and d = r_B - r_A, (3,), in ground axes."""

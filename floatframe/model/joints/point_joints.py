@@ -12,7 +12,7 @@ from fe_models.foundation.records import checked_fields, frozen_copies
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Place
 from floatframe.model.checked_values import number
-from floatframe.model.joints.axis_frame import GivenMotions, checked_axes, checked_motions, given_motions, normals_of
+from floatframe.model.joints.axis_frame import AxisJoint, GivenMotions, checked_motions, given_motions, normals_of
 from floatframe.model.joints.joint import Joint
 from floatframe.model.joints.rows import DISTANCE, NO_MOMENT, ROD, SLIDE, SPAN, Row, RowCoordinate, arm_rows, slide_row
 
@@ -25,7 +25,7 @@ __all__ = ["DistanceJoint", "PointOnLine", "PointOnPlane"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class PointOnLine(Joint):
+class PointOnLine(AxisJoint):
     """Keeps the point of marker B on a line through the point of marker A; two constraints.
 
     Coordinate `distance`: from the point of A to the point of B, along the line.
@@ -52,10 +52,6 @@ class PointOnLine(Joint):
     moment_b = NO_MOMENT  #: index at which the moment on B starts in the wrench
     coordinates = ("distance",)
 
-    def __post_init__(self) -> None:
-        checked_axes(self)
-        checked_motions(self)
-
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
         """Return the rows for the assembled axes of the markers, (3, 3), and d = r_B - r_A, (3,), in ground axes."""
         held = (Row(SLIDE, n) for n in normals_of(self.axis))
@@ -68,7 +64,7 @@ class PointOnLine(Joint):
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
-class PointOnPlane(Joint):
+class PointOnPlane(AxisJoint):
     """Keeps the point of marker B on a plane through the point of marker A; one constraint.
 
     Coordinates: `first` and `second`, the position of the point of B in the plane along the two directions of
@@ -95,10 +91,6 @@ class PointOnPlane(Joint):
     size = 6  #: components of the unknown wrench
     moment_b = NO_MOMENT  #: index at which the moment on B starts in the wrench
     coordinates = ("first", "second")
-
-    def __post_init__(self) -> None:
-        checked_axes(self)
-        checked_motions(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
         """Return the rows for the assembled axes of the markers, (3, 3), and d = r_B - r_A, (3,), in ground axes."""

@@ -97,14 +97,14 @@ def coil(radius: float, length: float, color: str | None) -> tuple[StretchedPiec
 
 def strut(radius: float, length: float, color: str | None) -> tuple[StretchedPiece, ...]:
     """Return a cylinder at the first marker and its rod at the second."""
-    outer = revolved(tube_profile(0.8 * radius, 0.0, 0.58 * length), Z, around=28, color=color or OUTER)
-    inner = revolved(tube_profile(0.32 * radius, 0.0, 0.62 * length), Z, around=20, color=INNER)
+    outer = revolved(tube_profile(0.8 * radius, 0.58 * length), Z, around=28, color=color or OUTER)
+    inner = revolved(tube_profile(0.32 * radius, 0.62 * length), Z, around=20, color=INNER)
     return StretchedPiece(outer, FIRST), StretchedPiece(inner, SECOND)
 
 
 def rod(radius: float, length: float, color: str | None) -> tuple[StretchedPiece, ...]:
     """Return a round bar."""
-    return (StretchedPiece(revolved(tube_profile(radius, 0.0, 1.0), Z, around=20, color=color or OUTER), STRETCH),)
+    return (StretchedPiece(revolved(tube_profile(radius, 1.0), Z, around=20, color=color or OUTER), STRETCH),)
 
 
 def line(radius: float, length: float, color: str | None) -> tuple[StretchedPiece, ...]:
@@ -113,9 +113,9 @@ def line(radius: float, length: float, color: str | None) -> tuple[StretchedPiec
     return (StretchedPiece(piece, STRETCH),)
 
 
-def tube_profile(radius: float, first: float, last: float) -> Array:
+def tube_profile(radius: float, length: float) -> Array:
     """Return the profile of a closed cylinder."""
-    return np.array([(0.0, first), (radius, first), (radius, last), (0.0, last)])
+    return np.array([(0.0, 0.0), (radius, 0.0), (radius, length), (0.0, length)])
 
 
 STRETCHED = {"coil": coil, "strut": strut, "rod": rod, "line": line}

@@ -57,7 +57,7 @@ class Wheel:
         ]
         if self.n_spokes:
             found.append(self.spokes(r, w))
-        marks = [arc_mark(self.axis, r + 0.55 * h, 0.1 * h, s * 1.005 * w, 0.25, MARK) for s in (-1, 1)]
+        marks = [arc_mark(self.axis, r + 0.55 * h, 0.1 * h, s * 1.005 * w, 0.25) for s in (-1, 1)]
         return (*found, joined(marks))
 
     def spokes(self, r: float, w: float) -> Piece:
@@ -110,7 +110,7 @@ class RailWheel:
             revolved(turned[1], self.axis, color=STEEL),
         ]
         marks = [
-            arc_mark(self.axis, 0.93 * R, 0.05 * R, side * 0.508 * w, 0.16, MARK, phase=k * np.pi / 2)
+            arc_mark(self.axis, 0.93 * R, 0.05 * R, side * 0.508 * w, 0.16, phase=k * np.pi / 2)
             for k in range(4)
             for side in (-1, 1)
         ]
@@ -137,7 +137,7 @@ def around(piece: Piece, axis: Array, n: int) -> Piece:
     return joined(copies)
 
 
-def arc_mark(axis: Array, r: float, half: float, place: float, angle: float, color: str, phase: float = 0.0) -> Piece:
+def arc_mark(axis: Array, r: float, half: float, place: float, angle: float, phase: float = 0.0) -> Piece:
     """Return a flat piece of a ring normal to an axis, visible from both sides."""
     x, y, z = axes_about(axis)
     turns = phase + np.linspace(-angle / 2, angle / 2, 5)
@@ -145,4 +145,4 @@ def arc_mark(axis: Array, r: float, half: float, place: float, angle: float, col
     nodes = np.concatenate([(r - half) * ring, (r + half) * ring]) + place * z
     k = np.arange(4)
     front = np.concatenate([np.stack([k, k + 5, k + 6], axis=1), np.stack([k, k + 6, k + 1], axis=1)])
-    return Piece(nodes, front if place > 0 else front[:, ::-1], color=color)
+    return Piece(nodes, front if place > 0 else front[:, ::-1], color=MARK)

@@ -51,14 +51,14 @@ class FlexibleSurface:
         return MOVE_STEP * self.largest_displacement / reach, STRESS_STEP * self.largest_stress / reach
 
 
-def nodes_within(n_bytes: float, bodies: dict[str, ReducedBody], *, with_stress: bool) -> dict[str, int]:
+def nodes_within(n_bytes: float, bodies: dict[str, ReducedBody]) -> dict[str, int]:
     """Return the number of nodes of each body that may be shown so that the data of all bodies fit into `n_bytes`.
 
     The numbers are proportional to the square roots of the numbers of nodes, so that a small body beside a large
     one is still drawn finely.
     """
     has = {name: len(np.unique(body.surface)) for name, body in bodies.items() if len(body.surface)}
-    parts = {name: 9 if with_stress and bodies[name].stress is not None else 3 for name in has}
+    parts = {name: 9 if bodies[name].stress is not None else 3 for name in has}
     cost = {name: 20 + 2 * parts[name] * bodies[name].n_q for name in has}
     low, high = 0.0, float(MOST)
     for _ in range(40):
@@ -68,9 +68,7 @@ def nodes_within(n_bytes: float, bodies: dict[str, ReducedBody], *, with_stress:
     return {name: int(np.clip(low * np.sqrt(has[name]), min(FEWEST, has[name]), min(MOST, has[name]))) for name in has}
 
 
-def flexible_surface(
-    number: int, body: ReducedBody, q: Array, most: int, *, is_stiffened: bool, with_stress: bool
-) -> FlexibleSurface:
+def flexible_surface(number: int, body: ReducedBody, q: Array, most: int, *, is_stiffened: bool) -> FlexibleSurface:
     """Return the surface of a body with at most about `most` nodes.
 
     Parameters
@@ -81,7 +79,7 @@ def flexible_surface(
     surface = shown_surface(body.nodes, body.surface, most)
     shapes = np.moveaxis(np.asarray(body.Phi)[surface.rows], 2, 0)
     stress = None
-    if with_stress and body.stress is not None:
+    if body.stress is not None:
         stress = np.moveaxis(np.asarray(body.stress)[surface.rows], 2, 0)
     amplitudes = np.asarray(q, dtype=float)
     if body.quadratic is not None and is_stiffened:

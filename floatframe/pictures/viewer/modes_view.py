@@ -77,13 +77,13 @@ def view_modes(
     shown = Shown(rest, system, dict(bodies), reduced, np.zeros(1, np.int64))
     parts = parts_of(rest, shapes)
     block, surfaces, elastic = Block(), [], {}
-    most = nodes_within(bytes_for_numbers(largest), reduced, with_stress=True)
+    most = nodes_within(bytes_for_numbers(largest), reduced)
     for i, name in enumerate(bodies):
         if name not in most:
             continue
         q = parts[i][:, 6:]
         history = np.concatenate([rest.body(name).q, q.real, q.imag])
-        whole = flexible_surface(i, reduced[name], history, most[name], is_stiffened=False, with_stress=True)
+        whole = flexible_surface(i, reduced[name], history, most[name], is_stiffened=False)
         elastic[i] = whole.amplitudes[1:]
         surfaces.append(at_rest(whole))
     record, cast = stage_record(shown, surfaces, block)

@@ -389,11 +389,11 @@ def bytes_of_row(trajectory: Trajectory, system: System | None) -> float:
 def surfaces_of(shown: Shown, n_bytes: float) -> list[FlexibleSurface]:
     """Return the surfaces of all flexible bodies within a number of bytes."""
     trajectory = shown.trajectory
-    most = nodes_within(max(n_bytes, 0.0), shown.reduced, with_stress=True)
+    most = nodes_within(max(n_bytes, 0.0), shown.reduced)
     return [
         flexible_surface(
             i, shown.reduced[name], trajectory.body(name).q[shown.rows], most[name],
-            is_stiffened=trajectory.entry(name)[1].is_stiffened, with_stress=True,
+            is_stiffened=trajectory.entry(name)[1].is_stiffened,
         )
         for i, name in enumerate(trajectory.body_names)
         if name in most

@@ -104,9 +104,9 @@ def check_mesh_order(reduced: ReducedBody) -> QualityRecord:
     return judge("mesh-order", error, f"{cells}: {told.partition(' ')[2]}", {"error": error})
 
 
-def step_size(frequency: float, steps: int = STEPS_PER_PERIOD) -> float:
-    """Return the time step for this number of steps per period of a frequency [s]."""
-    return 1.0 / (steps * frequency)
+def step_size(frequency: float) -> float:
+    """Return the time step for `STEPS_PER_PERIOD` steps per period of a frequency [s]."""
+    return 1.0 / (STEPS_PER_PERIOD * frequency)
 
 
 def check_step_size(reduced: ReducedBody) -> QualityRecord:

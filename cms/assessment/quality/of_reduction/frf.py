@@ -113,7 +113,7 @@ def compare_responses(full: FrequencyResponse, reduced: FrequencyResponse, lengt
 
 
 def response_comparison(
-    reference: FullReference, model: PortModel, *, frequencies: Array | None = None, damping: float = DAMPING
+    reference: FullReference, model: PortModel, *, frequencies: Array | None = None
 ) -> ResponseComparison:
     """Compare responses at all interfaces, from well below the first elastic mode to the top of the band.
 
@@ -144,8 +144,8 @@ def response_comparison(
         )
     known = reference.response
     time = body.units.time
-    full = modal_response(known.model, frequencies, damping=damping, time=time)
-    reduced = modal_response(model, frequencies, damping=damping, time=time)
+    full = modal_response(known.model, frequencies, damping=DAMPING, time=time)
+    reduced = modal_response(model, frequencies, damping=DAMPING, time=time)
     return ResponseComparison(full, reduced, compare_responses(full, reduced, body.length), known.error)
 
 

@@ -23,7 +23,7 @@ __all__ = [
     "stiffness_shells",
 ]
 
-#: field number of THETA or MCID
+#: field number of THETA or MCID; that of ZOFFS follows
 ANGLE_FIELD = {"CTRIA3": 6, "CTRIAR": 6, "CTRIA6": 9, "CQUAD4": 7, "CQUADR": 7, "CQUAD8": 15}
 MOST_DIRECTIONS = 200  #: largest number of directions for one property; each becomes a table of the job
 DIGITS = 6  #: digits to which directions must agree
@@ -68,7 +68,7 @@ def layers_of_card(card: Card) -> tuple[DeckLayer, ...] | str:
     return tuple(layers + layers[::-1] if kind == "SYM" else layers)
 
 
-def layered_shells(model: NastranModel, known: Card, cards: list[Card], offset_field: dict[str, int]) -> None:
+def layered_shells(model: NastranModel, known: Card, cards: list[Card]) -> None:
     """Convert shells of one PCOMP: a section for each offset and layup direction.
 
     The direction is the side from G1 to G2 rotated by THETA about the normal, or axis x of the system MCID. Z0 is the
@@ -83,7 +83,7 @@ def layered_shells(model: NastranModel, known: Card, cards: list[Card], offset_f
     thickness = sum(layer.thickness for layer in layers)
     bottom = known.real(2, -thickness / 2)
     section = ShellSection("", "", thickness, bottom + thickness / 2, known.real(3, 0.0) * model.wtmass, layers=layers)
-    _laid_shells(model, known, cards, offset_field, section)
+    _laid_shells(model, known, cards, section)
 
 
 def _layer_material(model: NastranModel, name: str) -> str:
@@ -99,15 +99,13 @@ def _layer_material(model: NastranModel, name: str) -> str:
     return made
 
 
-def orthotropic_shells(
-    model: NastranModel, known: Card, cards: list[Card], offset_field: dict[str, int], section: ShellSection
-) -> None:
+def orthotropic_shells(model: NastranModel, known: Card, cards: list[Card], section: ShellSection) -> None:
     """Convert shells of a PSHELL with MAT8: one layer of its material, oriented as for PCOMP."""
     layers = (DeckLayer(section.material, section.thickness),)
-    _laid_shells(model, known, cards, offset_field, replace(section, material="", layers=layers))
+    _laid_shells(model, known, cards, replace(section, material="", layers=layers))
 
 
-def plane_strain_shells(model: NastranModel, known: Card, cards: list[Card], offset_field: dict[str, int]) -> None:
+def plane_strain_shells(model: NastranModel, known: Card, cards: list[Card]) -> None:
     """Convert membranes of PLPLANE, or of PSHELL with MID2 = -1, to a planar body in plane strain.
 
     The body is a slice of thickness T (1 if blank); for its material see `DeckMaterial.in_plane_strain`.
@@ -137,7 +135,7 @@ def plane_strain_shells(model: NastranModel, known: Card, cards: list[Card], off
     added = 0.0 if is_plplane else known.real(8, 0.0) * model.wtmass
     offsets: dict[float, list[Card]] = {}
     for card in cards:
-        offsets.setdefault(card.real(offset_field[card.name], 0.0), []).append(card)
+        offsets.setdefault(card.real(ANGLE_FIELD[card.name] + 1, 0.0), []).append(card)
     x, y, z = (float(v) for v in np.eye(3)[model.plane - 1])
     for offset, mine in offsets.items():
         group = f"pid_{pid}" if len(offsets) == 1 else f"pid_{pid}_offset_{offset:g}"
@@ -161,7 +159,7 @@ def needs_matrices(model: NastranModel, known: Card) -> bool:
     return len(used) == 3 and (has_mixed_axes or used[0].poisson != used[1].poisson)
 
 
-def stiffness_shells(model: NastranModel, known: Card, cards: list[Card], offset_field: dict[str, int]) -> None:
+def stiffness_shells(model: NastranModel, known: Card, cards: list[Card]) -> None:
     """Convert shells of a PSHELL with separate materials for membrane, bending, shear and coupling.
 
     (1) A = T G1, D = I G2 with I = (12I/T**3) T³/12, and H = TS G3 with TS = (TS/T) T
@@ -197,7 +195,7 @@ def stiffness_shells(model: NastranModel, known: Card, cards: list[Card], offset
         "", "", T, 0.0, mass,
         stiffness=tuple(map(tuple, C.tolist())), shear_stiffness=tuple(map(tuple, H.tolist())),
     )  # fmt: skip
-    _laid_shells(model, known, cards, offset_field, section)
+    _laid_shells(model, known, cards, section)
 
 
 def _is_positive(matrix: Array) -> bool:
@@ -251,15 +249,13 @@ def _density(model: NastranModel, name: str) -> float:
     return model.materials[name].density or 0.0 if card is None else card.real(8, 0.0) * model.wtmass
 
 
-def _laid_shells(
-    model: NastranModel, known: Card, cards: list[Card], offset_field: dict[str, int], section: ShellSection
-) -> None:
+def _laid_shells(model: NastranModel, known: Card, cards: list[Card], section: ShellSection) -> None:
     pid = known.text(1)
     groups: dict[tuple[float, tuple[float, ...]], list[Card]] = {}
     for card in cards:
         direction = _direction(model, card)
         key = tuple((np.round(direction / np.linalg.norm(direction), DIGITS) + 0.0).tolist())
-        groups.setdefault((card.real(offset_field[card.name], 0.0), key), []).append(card)
+        groups.setdefault((card.real(ANGLE_FIELD[card.name] + 1, 0.0), key), []).append(card)
     if len(groups) > MOST_DIRECTIONS:
         why = f"property {pid}: more than {MOST_DIRECTIONS} directions of angle 0; give them by MCID"
         model.ledger.refuse(known.name, why, count=len(cards))

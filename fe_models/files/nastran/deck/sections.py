@@ -16,6 +16,7 @@ from fe_models.files.decks.deck import (
 from fe_models.files.nastran.bulk_data.cards import Card
 from fe_models.files.nastran.deck.bars import BARS, read_bars, with_defaults
 from fe_models.files.nastran.deck.layups import (
+    ANGLE_FIELD,
     layered_shells,
     needs_matrices,
     orthotropic_shells,
@@ -32,7 +33,6 @@ SAME_MODULUS = 1e-6  #: relative difference of G from E/(2 (1 + nu)) up to which
 
 SOLIDS = ("CTETRA", "CHEXA", "CPENTA", "CPYRAM", "CPYRA")
 SHELLS = ("CTRIA3", "CTRIAR", "CTRIA6", "CQUAD4", "CQUADR", "CQUAD8")
-_OFFSET_FIELD = {"CTRIA3": 7, "CTRIAR": 7, "CTRIA6": 10, "CQUAD4": 8, "CQUADR": 8, "CQUAD8": 16}
 #: card -> number of corner grids, and the two corners of the edge of each middle grid, in the order of the card
 _MIDDLES: dict[str, tuple[int, tuple[tuple[int, int], ...]]] = {
     "CTETRA": (4, ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))),
@@ -165,10 +165,10 @@ def _solids(model: NastranModel, known: Card, cards: list[Card]) -> None:
 def _shells(model: NastranModel, known: Card, cards: list[Card]) -> None:
     pid = known.text(1)
     if known.name in ("PCOMP", "PCOMPG"):
-        layered_shells(model, known, cards, _OFFSET_FIELD)
+        layered_shells(model, known, cards)
         return
     if known.name == "PLPLANE":
-        plane_strain_shells(model, known, cards, _OFFSET_FIELD)
+        plane_strain_shells(model, known, cards)
         return
     if known.name != "PSHELL":
         model.ledger.refuse(cards[0].name, f"property {pid} is {known.name}", count=len(cards))
@@ -180,14 +180,14 @@ def _shells(model: NastranModel, known: Card, cards: list[Card]) -> None:
     thickness = known.real(3)
     cards = [card for card in cards if _has_thickness(model, card, thickness)]
     if known.text(4) == "-1":
-        plane_strain_shells(model, known, cards, _OFFSET_FIELD)
+        plane_strain_shells(model, known, cards)
         return
     added = known.real(8, 0.0) * model.wtmass
     if not known.text(6):
         why = "MID3 is blank, rigid in transverse shear there: here 5/6 G t"
         model.ledger.note("PSHELL", why, count=len(cards))
     if needs_matrices(model, known):
-        stiffness_shells(model, known, cards, _OFFSET_FIELD)
+        stiffness_shells(model, known, cards)
         return
     ratios = _ratios(model, known)
     if isinstance(ratios, str):
@@ -196,11 +196,11 @@ def _shells(model: NastranModel, known: Card, cards: list[Card]) -> None:
     if isinstance(model.materials[known.text(2)].young, tuple):
         section = ShellSection("", known.text(2), thickness, 0.0, added)
         section = replace(section, bending_ratio=ratios[0], shear_ratio=ratios[1])
-        orthotropic_shells(model, known, cards, _OFFSET_FIELD, section)
+        orthotropic_shells(model, known, cards, section)
         return
     offsets: dict[float, list[Card]] = {}
     for card in cards:
-        offsets.setdefault(card.real(_OFFSET_FIELD[card.name], 0.0), []).append(card)
+        offsets.setdefault(card.real(ANGLE_FIELD[card.name] + 1, 0.0), []).append(card)
     for offset, mine in offsets.items():
         group = f"pid_{pid}" if len(offsets) == 1 else f"pid_{pid}_offset_{offset:g}"
         _cells(model, mine, group)

@@ -28,10 +28,10 @@ class Lines:
     results: tuple[tuple[str, ...], ...]
 
 
-def with_subscript(name: str, first: int, brackets: str) -> str:
-    """Return the symbol name[k] with other brackets and another first index."""
+def with_subscript(name: str) -> str:
+    """Return the symbol name[k] as name(k + 1)."""
     stem, _, k = name[:-1].partition("[")
-    return f"{stem}{brackets[0]}{int(k) + first}{brackets[1]}"
+    return f"{stem}({int(k) + 1})"
 
 
 def needed_inputs(routine: Routine) -> set[str]:

@@ -49,8 +49,7 @@ def size_of(sizes: Sequence[float], inputs: Array, n: int, width: int, k: int) -
 
 
 def difference_slopes(
-    address: int, head: tuple[int, ...], data: Array | Sequence[float], inputs: Array, sizes: Sequence[float],
-    step: float = STEP,
+    address: int, head: tuple[int, ...], data: Array | Sequence[float], inputs: Array, sizes: Sequence[float]
 ) -> Array:  # fmt: skip
     """Return the derivatives of all results by all variables, (6 n + n_z + n_lam + n_seen, n_columns).
 
@@ -60,7 +59,7 @@ def difference_slopes(
     n_out, n_columns = 6 * n + n_z + n_lam + n_seen, (width - 6) * n + n_z + n_lam
     slopes = np.zeros((n_out, n_columns))
     for k in range(n_columns):
-        h = step * size_of(sizes, inputs, n, width, k)
+        h = STEP * size_of(sizes, inputs, n, width, k)
         rows = np.array([varied(inputs, n, width, k, steps * h) for steps, _ in STENCIL])
         values = called_law(address, head, np.asarray(data), rows, n_out)
         slopes[:, k] = np.array([factor for _, factor in STENCIL]) @ values / h
