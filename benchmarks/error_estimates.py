@@ -77,9 +77,12 @@ def exact_modes(families: Families) -> tuple[np.ndarray, np.ndarray]:
 
 
 def judged(n: int) -> tuple[int, dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Return the number of bodies, and true and estimated errors of frequencies and responses of each set."""
-    found: dict[str, list[tuple[float, float]]] = {name: [] for name in SETS}
-    responses: dict[str, list[tuple[float, float]]] = {name: [] for name in SETS}
+    """Return the number of bodies, and errors of frequencies and of responses of each set.
+
+    Columns are the true and the estimated error; for frequencies also the largest one, and whether it is uncertain.
+    """
+    found: dict[str, list[tuple[float, ...]]] = {name: [] for name in SETS}
+    responses: dict[str, list[tuple[float, ...]]] = {name: [] for name in SETS}
     n_bodies = 0
     for seed, body in bodies(n):
         rng = np.random.default_rng(seed)
@@ -97,11 +100,16 @@ def judged(n: int) -> tuple[int, dict[str, np.ndarray], dict[str, np.ndarray]]:
                 except CmsError:
                     continue
                 k = min(len(errors.frequency), len(exact))
-                found[name] += zip(basis.frequencies()[:k] / exact[:k] - 1, errors.frequency[:k], strict=True)
+                largest = errors.largest if len(errors.largest) else np.full(len(errors.frequency), np.nan)
+                of_modes = (errors.frequency, largest, errors.is_uncertain)
+                found[name] += zip(
+                    basis.frequencies()[:k] / exact[:k] - 1, *(each[:k] for each in of_modes), strict=True
+                )
                 true = response_errors(basis, len(errors.frequency), loads, loads.T @ X, mu)
                 responses[name] += zip(true, errors.response, strict=True)
     return n_bodies, *(
-        {name: np.array(pairs).reshape(-1, 2) for name, pairs in each.items()} for each in (found, responses)
+        {name: np.array(rows).reshape(-1, n_columns) for name, rows in each.items()}
+        for each, n_columns in ((found, 4), (responses, 2))
     )
 
 
@@ -110,6 +118,7 @@ def print_judged(n: int) -> None:
     n_bodies, frequencies, responses = judged(n)
     print(f"{n_bodies} bodies; true errors from {LEAST:g} to {MOST:g}")
     print_ratios("errors of frequencies", frequencies, LEAST)
+    print_limits(np.concatenate(list(frequencies.values())))
     print_ratios("errors of frequency responses between the interfaces", responses, LEAST_RESPONSE)
 
 
@@ -118,13 +127,34 @@ def print_ratios(title: str, found: dict[str, np.ndarray], rounding: float) -> N
     print(f"\n{title}")
     print(f"{'set':26s}{'modes':>7s}{'counted':>9s}{'in [0.5, 2]':>13s}{'least':>8s}{'most':>7s}{'exact':>7s}")
     for name, pairs in [*found.items(), ("all", np.concatenate(list(found.values())))]:
-        true, estimate = pairs.T
+        true, estimate = pairs[:, :2].T
         is_counted = (true > rounding) & (true < MOST)
         ratio = estimate[is_counted] / true[is_counted]
         within = f"{100 * np.mean((ratio >= 0.5) & (ratio <= 2)):.1f} %" if len(ratio) else ""
         span = (f"{ratio.min():.2f}", f"{ratio.max():.2f}") if len(ratio) else ("", "")
         n_exact = int((true <= rounding).sum())
         print(f"{name:26s}{len(true):7d}{len(ratio):9d}{within:>13s}{span[0]:>8s}{span[1]:>7s}{n_exact:7d}")
+
+
+def print_limits(found: np.ndarray) -> None:
+    """Print how many estimates are marked uncertain, the least of the others, and whether any limit is exceeded."""
+    true, estimate, largest = found[:, :3].T
+    is_uncertain, is_counted = found[:, 3] > 0, (true > LEAST) & (true < MOST)
+    certain = is_counted & ~is_uncertain
+    far = is_counted & (estimate < 0.2 * true)
+    print(
+        f"uncertain: {(is_counted & is_uncertain).sum()} of {is_counted.sum()}; of exact ones "
+        f"{(is_uncertain & (true <= LEAST)).sum()} of {(true <= LEAST).sum()}"
+    )
+    print(f"below 0.2 of the true error: {far.sum()}, of which uncertain {(far & is_uncertain).sum()}")
+    print(
+        f"least ratio of those not uncertain: {(estimate / true)[certain].min():.2f}; within [0.5, 2]: "
+        f"{100 * np.mean((estimate / true)[certain] >= 0.5):.1f} %"
+    )
+    print(
+        f"true errors above the largest one: {(is_counted & (true > largest * 1.001 + LEAST)).sum()} of "
+        f"{(is_counted & np.isfinite(largest)).sum()}"
+    )
 
 
 def print_cost(n: int, n_modes: int) -> None:

@@ -10,7 +10,10 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.records import ArrayShape, checked_fields, frozen_copies
 
-__all__ = ["ErrorEstimates"]
+__all__ = ["ErrorEstimates", "are_uncertain"]
+
+UNCERTAIN = 5.0  #: ratio of the largest error to the estimate, above which the estimate is uncertain
+ROUNDING = 1e-9  #: largest error that is rounding
 
 
 @frozen_copies
@@ -52,6 +55,9 @@ class ErrorEstimates:
         "+": these frequencies are too high; "+-": too high or too low.
     mesh_method
         How `mesh` was estimated, or why it is not known.
+    largest
+        Largest f_reduced / f - 1 of each frequency, whatever modes are beyond the cutoff of the set,
+        (n_judged,); NaN: not limited. Empty: the set has no vibration modes, or the file is older.
     left_out
         Shapes that the mode set lacks, over the loads of a motion; None: not recorded.
     """
@@ -68,9 +74,22 @@ class ErrorEstimates:
     mesh: Annotated[Array, ArrayShape((None,), has_nan=True)] = field(default_factory=lambda: np.zeros(0))
     mesh_sign: str = ""
     mesh_method: str = ""
+    largest: Annotated[Array, ArrayShape((None,), has_nan=True)] = field(default_factory=lambda: np.zeros(0))
     left_out: LeftOutModes | None = None
 
     @property
     def distance(self) -> Array:
         """Bound of |f_reduced / f - 1| for some exact frequency f, (n_judged,); inf: no bound."""
         return np.where(self.bound < 1, 1 - np.sqrt(np.maximum(1 - self.bound, 0.0)), np.inf)
+
+    @property
+    def is_uncertain(self) -> Array:
+        """Whether a frequency may be wrong by more than five times its estimate, (n_judged,) bool."""
+        return are_uncertain(self.frequency, self.largest)
+
+
+def are_uncertain(frequency: Array, largest: Array) -> Array:
+    """Return whether largest errors are more than five times the estimates, (n,) bool; False if they are not known."""
+    if not len(largest):
+        return np.zeros(len(frequency), dtype=bool)
+    return np.asarray(~(largest <= np.maximum(UNCERTAIN * frequency, ROUNDING)))

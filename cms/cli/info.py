@@ -142,7 +142,7 @@ def print_free_frequencies(record: Any) -> None:
             "mode>",
             "Hz>",
             "reduction>",
-            "at most>",
+            *(["at most>"] if errors["largest"] else []),
             "shape>",
             *(["response>"] if errors["response"] else []),
             *(["mesh>"] if of_mesh else []),
@@ -151,8 +151,9 @@ def print_free_frequencies(record: Any) -> None:
             (
                 str(k + 1),
                 frequencies[k],
-                error_percent(errors["frequency"][k], "+"),
-                *(error_percent(errors[key][k]) for key in ("distance", "shape")),
+                error_percent(errors["frequency"][k], "+") + " ?" * errors["is_uncertain"][k],
+                *map(error_percent, errors["largest"][k : k + 1]),
+                error_percent(errors["shape"][k]),
                 *map(error_percent, errors["response"][k : k + 1]),
                 *of_mesh[k : k + 1],
             )
@@ -160,10 +161,12 @@ def print_free_frequencies(record: Any) -> None:
         ],
     )
     say(
-        "reduction: an estimate, and the true error is not smaller; at most: some exact frequency is so near; shape: "
-        "in the norm of strain energy; response: estimate for the receptance between the interfaces around this "
-        "frequency, with 1 % damping"
+        "reduction: an estimate, and the true error is not smaller; at most: whatever modes are beyond the cutoff of "
+        "the set, no limit where it is empty; shape: in the norm of strain energy; response: estimate for the "
+        "receptance between the interfaces around this frequency, with 1 % damping"
     )
+    if any(errors["is_uncertain"]):
+        say("?: uncertain, a mode that the set lacks may be near: the error may be more than five times the estimate")
     if errors["mesh_method"]:
         say(f"mesh: {errors['mesh_method']}")
     if len(frequencies) > n:

@@ -27,6 +27,8 @@ is K-orthogonal to V, because phi is a Galerkin solution.
     the energy p_j = |Qᵀ f_j|² in its span. Two more sums with random signs and the weights 1 / sqrt(p_j) have outside Q
     the mean energy sum_j r_j / p_j, where r_j is the energy that correction j lacks. The bound (1) contains this sum
     times p_j. If the sum is too large, G is applied to every load.
+(6) Modes beside V that are close to the cutoff of the set are in no correction. `largest_errors` says how large the
+    errors of (2) may be with them.
 
 References
 ----------
@@ -50,19 +52,21 @@ from cms.modes.families.receptance import boundary_scale
 from cms.modes.families.static_modes import ROUNDING_ENERGY
 from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.free_basis import FreeBasis
+from cms.reduction.frequency_bracket import largest_errors
 from cms.reduction.left_out_modes import left_out_modes, orthonormal
 from cms.reduction.mesh_error import mesh_errors
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.tall.columns import combine, dots, gram, inner, subtract
 
-__all__ = ["FrequencyErrors", "energy_error", "error_estimates", "frequency_errors", "require_one_process"]
+__all__ = ["FrequencyErrors", "cutoff_of", "energy_error", "error_estimates", "frequency_errors", "require_one_process"]
 
 JUDGED = 30  #: number of judged modes of a set without vibration modes, which has no cutoff
 RANDOM, SEED = 6, 20  #: number of random columns of (3), and their seed
 TESTS, MISSING = 2, 0.01  #: number of tests of (5), and the sum of relative energies that corrections may lack
 SMALL = 1e-4  #: size of a correction relative to its mode, below which p_j in (5) is that of this size
 FREQUENCY_ROUNDING = 1e-10  #: estimated error of a frequency, below which it is rounding
+EXACT_BOUND = FREQUENCY_ROUNDING**0.5  #: bound b of a mode whose error of frequency is rounding
 EXACT = 1e-7  #: bound b, below which a mode is exact within rounding
 CLUSTER = 1e-3  #: relative gap of frequencies, below which shapes are judged by their common subspace
 CLUSTERED = 8  #: number of shapes beyond the judged ones that may belong to the subspace of the last of them
@@ -87,6 +91,7 @@ class FrequencyErrors:
     frequency: Array  #: estimate of f_reduced / f - 1, (n,)
     bound: Array  #: bound b, (n,)
     shape: Array  #: estimate of the error of the shape in the norm of strain energy, (n,)
+    largest: Array  #: largest error of the frequency, (n,); NaN: not limited; empty: the set has no cutoff
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +102,7 @@ class EnlargedSpace:
     mu: Array  #: 1 / omega² of the new shapes, descending, (n_W,)
     Y: Array  #: part of each shape of V, scaled to unit strain energy, in each new shape, (n_V, n_W)
     motion: Array  #: motion in the directions of the loads in the new shapes of unit strain energy, (n_loads, n_W)
+    masses: tuple[Array, Array, Array]  #: mu of V, its coupling with X, and the mass of X; see `largest_errors`
     X: DisplacementColumns  #: corrections, residual responses and random columns, K-orthogonal to V, (n_dof, n_X)
     inertia: Array  #: error of the set for each inertia load; see `ErrorEstimates`, (n_r,)
 
@@ -129,8 +135,10 @@ def error_estimates(
         Its frame.
     """
     frequencies = basis.frequencies()
-    vibrating = modes.frequencies[~modes.is_static]
-    n = int((frequencies <= (1 + EXACT) * vibrating.max()).sum()) if len(vibrating) else min(JUDGED, len(frequencies))
+    cutoff = cutoff_of(modes)
+    n = min(JUDGED, len(frequencies))
+    if cutoff is not None:
+        n = int((2 * np.pi * frequencies <= (1 + EXACT) * cutoff).sum())
     n = min(max(n, 1), len(frequencies))
     mesh = mesh_errors(families.body, basis, n)
     loads, interface = interface_errors(families, basis)
@@ -138,7 +146,7 @@ def error_estimates(
     directions = response_loads(families.body)
     has_statics = not np.nan_to_num(interface).any()
     space = enlarged_space(families, basis, n, directions, inertia_loads(families), has_statics=has_statics)
-    errors = errors_of_modes(basis, space)
+    errors = errors_of_modes(basis, space, cutoff)
     return ErrorEstimates(
         four_digits(errors.frequency, FREQUENCY_ROUNDING),
         four_digits(errors.bound),
@@ -152,14 +160,21 @@ def error_estimates(
         mesh=four_digits(mesh.frequency, FREQUENCY_ROUNDING) if mesh.sign else np.zeros(0),
         mesh_sign=mesh.sign,
         mesh_method=mesh.method,
+        largest=four_digits(errors.largest, FREQUENCY_ROUNDING),
         left_out=left_out_modes(families, basis, space.X, Phi, frame),
     )
 
 
-def frequency_errors(families: Families, basis: FreeBasis, n: int) -> FrequencyErrors:
-    """Estimate the errors of the lowest n free frequencies and shapes."""
+def frequency_errors(families: Families, basis: FreeBasis, n: int, cutoff: float | None = None) -> FrequencyErrors:
+    """Estimate the errors of the lowest n free frequencies and shapes; `cutoff` is that of the set, if it has one."""
     none = np.zeros((families.body.n_dof, 0))
-    return errors_of_modes(basis, enlarged_space(families, basis, n, none, none))
+    return errors_of_modes(basis, enlarged_space(families, basis, n, none, none), cutoff)
+
+
+def cutoff_of(modes: ModeSet) -> float | None:
+    """Return the highest angular frequency of the vibration modes of a set; None if it has none."""
+    vibrating = modes.frequencies[~modes.is_static]
+    return 2 * np.pi * float(vibrating.max()) if len(vibrating) else None
 
 
 def enlarged_space(
@@ -289,25 +304,32 @@ def energy_inside(loads: CorrectionLoads, X: DisplacementColumns) -> tuple[Array
     return np.maximum(((T.T @ loads.work(X)) ** 2).sum(axis=0), (EXACT * loads.size) ** 2), T
 
 
-def errors_of_modes(basis: FreeBasis, space: EnlargedSpace) -> FrequencyErrors:
+def errors_of_modes(basis: FreeBasis, space: EnlargedSpace, cutoff: float | None) -> FrequencyErrors:
     """Compare the judged modes with the shapes of the enlarged space."""
     n = len(space.bound)
     mu, Y = space.mu[: n + CLUSTERED], space.Y[:, : n + CLUSTERED]
     frequency = np.sqrt(np.maximum(basis.omega2[:n] * mu[:n], 1.0)) - 1
     own = np.sqrt(mu[:n, None])
     inside = np.where(np.abs(np.sqrt(mu) - own) < CLUSTER * own, Y[:n] ** 2, 0.0).sum(axis=1)
-    return FrequencyErrors(frequency, space.bound, np.sqrt(np.maximum(1 - inside, 0.0)))
+    shape = np.sqrt(np.maximum(1 - inside, 0.0))
+    if cutoff is None:
+        return FrequencyErrors(frequency, space.bound, shape, np.zeros(0))
+    largest = largest_errors(np.maximum(frequency, FREQUENCY_ROUNDING), basis.omega2[:n], space.masses, cutoff)  # (6)
+    is_exact = np.logical_and.accumulate((space.bound <= EXACT_BOUND) & (frequency < FREQUENCY_ROUNDING))
+    return FrequencyErrors(frequency, space.bound, shape, np.where(is_exact, 0.0, largest))
 
 
-def ritz_shapes(basis: FreeBasis, X: DisplacementColumns, directions: Array) -> tuple[Array, Array, Array]:
-    """Return mu, Y and motion of `EnlargedSpace` by the Rayleigh-Ritz method in the span of V and X, VᵀKX = 0."""
+def ritz_shapes(
+    basis: FreeBasis, X: DisplacementColumns, directions: Array
+) -> tuple[Array, Array, Array, tuple[Array, Array, Array]]:
+    """Return mu, Y, motion and masses of `EnlargedSpace` by the Rayleigh-Ritz method; VᵀKX = 0."""
     omega, T = np.sqrt(basis.omega2), orthonormal(X)
     beside = (inner(basis.Phi, X.MX) / omega[:, None]) @ T
-    mass = np.block([[np.diag(static_factors(basis)), beside], [beside.T, T.T @ gram(X.X, X.MX) @ T]])
-    mu, Y = la.eigh(mass)
+    masses = static_factors(basis), beside, T.T @ gram(X.X, X.MX) @ T
+    mu, Y = la.eigh(np.block([[np.diag(masses[0]), beside], [beside.T, masses[2]]]))
     mu, Y = np.maximum(mu[::-1], 0.0), Y[:, ::-1]
     motion = np.hstack([inner(directions, basis.Phi) / omega, inner(directions, X.X) @ T]) @ Y
-    return mu, Y[: len(omega)], motion
+    return mu, Y[: len(omega)], motion, masses
 
 
 def static_factors(basis: FreeBasis) -> Array:

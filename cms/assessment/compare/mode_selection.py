@@ -15,12 +15,13 @@ from cms.assessment.compare.subsets import SUBSETS
 from cms.assessment.quality.of_reduction.frf import compare_responses, frequency_grid
 from cms.assessment.quality.reference.full_reference import FullReference
 from cms.assessment.quality.reference.port_model import PortModel, modal_response
+from cms.body.error_estimates import are_uncertain
 from cms.errors import ModeSetError
 from cms.modes.families.families import Families, families_of
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets import MODE_SETS
 from cms.reduction.basis.free_basis import FreeBasis, free_basis
-from cms.reduction.error_estimates import DAMPING, LOWEST, frequency_errors
+from cms.reduction.error_estimates import DAMPING, LOWEST, cutoff_of, frequency_errors
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
@@ -96,8 +97,8 @@ def select_modes(
         "frequency": largest relative error of the elastic free-free frequencies in the band.
         "frf": root mean square, over the logarithm of frequency, of the relative error of the receptance of all
         interfaces, 1 % modal damping (`cms.assessment.quality.of_reduction.frf`).
-        "estimate": twice the estimated error of these frequencies (`cms.reduction.error_estimates`), with a count of
-        the exact modes, without a solution of the full model.
+        "estimate": twice the estimated error of these frequencies (`cms.reduction.error_estimates`), the largest error
+        of uncertain ones, with a count of the exact modes, without a solution of the full model.
     options
         Options of the set other than the number of modes.
     added
@@ -289,13 +290,16 @@ def _by_estimate(make: _Maker, band: tuple[float, float], error: float) -> Itera
         n_columns, found = len(modes.labels), basis.frequencies(time)
         if len(found) < n_band:
             return Trial(n, n_columns, np.inf, f"has {len(found)} elastic modes, the band holds mode {n_band}")
-        errors = frequency_errors(families, basis, n_band).frequency
-        if found[n_band - 1] / (1 + errors[-1]) > (1 + error) * band[1]:
+        judged = frequency_errors(families, basis, n_band, cutoff_of(modes))
+        if found[n_band - 1] / (1 + judged.frequency[-1]) > (1 + error) * band[1]:
             return Trial(n, n_columns, np.inf, f"lacks one of the {n_band} elastic modes of the band")
-        errors = SAFETY * np.where(found[:n_band] >= band[0], errors, 0.0)
+        uncertain, errors = np.flatnonzero(are_uncertain(judged.frequency, judged.largest)), SAFETY * judged.frequency
+        errors[uncertain] = np.nan_to_num(judged.largest[uncertain], nan=np.inf)
+        errors[found[:n_band] < band[0]] = 0.0
         k = int(np.argmax(errors))
+        words = "its limit, because modes are close" if k in uncertain else "twice its estimate"
         where = (
-            f"largest at free mode {k + 1}, {found[k]:.5g} Hz, and twice its estimate; all {n_band} elastic modes up "
+            f"largest at free mode {k + 1}, {found[k]:.5g} Hz, and {words}; all {n_band} elastic modes up "
             f"to {band[1]:g} Hz are there, as counted"
         )
         return Trial(n, n_columns, float(errors[k]), where)

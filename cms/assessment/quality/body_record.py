@@ -117,6 +117,8 @@ def errors_record(errors: ErrorEstimates) -> dict[str, Any]:
         "frequency": errors.frequency.tolist(),
         "bound": errors.bound.tolist(),
         "distance": [_finite(x) for x in errors.distance],
+        "largest": [_finite(x) for x in errors.largest],
+        "is_uncertain": errors.is_uncertain.tolist(),
         "shape": errors.shape.tolist(),
         "response": errors.response.tolist(),
         "interface_loads": list(errors.interface_loads),

@@ -167,6 +167,10 @@ ENTRIES = {
         "(n_judged,)", "estimated relative error of these frequencies of the finite element model by its mesh; NaN: "
         "not known; 10: 10 or more",
     ),
+    "/errors/largest": Entry(
+        "(n_judged,)", "largest f_reduced / f - 1 of these frequencies with modes that the set may lack; NaN: not "
+        "limited",
+    ),
     "/errors/left_out/mass": Entry(
         "(n_shapes,)", "1 / omega^2 of each vibration shape of modes and left-out shapes together; 0: massless",
         Dimensions(0, 0, 2),
@@ -370,7 +374,7 @@ GROUPS = {
     "/errors": Group(
         ErrorEstimates,
         {"method": str, "date": str, "mesh_sign": str, "mesh_method": str},
-        if_any=("response", "interface_loads", "mesh", "mesh_sign", "mesh_method"),
+        if_any=("response", "interface_loads", "mesh", "mesh_sign", "mesh_method", "largest"),
     ),
     "/errors/left_out": Group(LeftOutModes),
     "/nodal_sums": Group(NodalSums, {"is_volume": bool}),

@@ -19,6 +19,7 @@ from cms.assessment.quality.of_body.identities import mode_size
 from cms.assessment.quality.of_reduction.fields import Compared, apart, same
 from cms.assessment.quality.of_reduction.full_shapes import FullShapes, finished_in, named_frame
 from cms.assessment.quality.record import QualityRecord, information, judge
+from cms.body.error_estimates import ErrorEstimates
 from cms.body.geometric_stiffness import UNIT_LOADS
 from cms.body.invariants import known_P, known_S_kl
 from cms.body.left_out_modes import LeftOutModes
@@ -56,6 +57,7 @@ PROBES = 12  #: number of random combinations of modes, if there are more modes
 FEW_NODES = 20  #: largest number of nodes whose quadratic modes are compared individually
 NODE_PROBES = 8  #: number of random combinations of nodes, if there are more nodes
 ROUNDING_OF_ERRORS = 1e-6  #: estimated error of a mode that is rounding
+DECADES_OF_LARGEST = 5.0  #: decades that count as one; largest errors are steps of half a decade at most
 NEGLIGIBLE = 1e-3  #: smallest scale of a difference, relative to the largest possible size of the field
 STRESS = (1.0, -1.0, -2.0)  #: dimensions of stress: exponents of mass, length and time
 CONVERTED = "frame converted from"  #: provenance entry of a file that was converted to another frame
@@ -317,6 +319,9 @@ def compare_errors(case: Case) -> Iterator[Compared]:
     if file.mesh_method:  # files of older programs have no estimate
         got, wanted = (np.nan_to_num(each.mesh, nan=-1.0) for each in (file, expected))
         yield apart("errors.mesh", got, wanted, np.abs(wanted) + ROUNDING_OF_ERRORS, axes="mode")
+    if len(file.largest):
+        got, wanted = decades_of_largest(file), decades_of_largest(expected)
+        yield apart("errors.largest", got, wanted, DECADES_OF_LARGEST, axes="mode")
     for name in ("interface", "inertia"):
         got, wanted = (np.nan_to_num(getattr(each, name), nan=-1.0) for each in (file, expected))
         yield apart(f"errors.{name}", got, wanted, np.abs(wanted) + STATIC_ROUNDING, axes="load")
@@ -324,6 +329,13 @@ def compare_errors(case: Case) -> Iterator[Compared]:
         yield from compare_left_out(file.left_out, expected.left_out, case.reduced)
     elif file.left_out is not None:
         yield Compared("errors.left_out.mass", np.inf, "", "the modes of the model leave nothing out")
+
+
+def decades_of_largest(errors: ErrorEstimates) -> Array:
+    """Return the decades of the largest errors of frequencies; those without limit count as a thousand estimates."""
+    unlimited = 1e3 * np.maximum(errors.frequency, ROUNDING_OF_ERRORS)
+    largest = np.where(np.isnan(errors.largest), unlimited, errors.largest)
+    return np.asarray(np.log10(np.maximum(largest, ROUNDING_OF_ERRORS)))
 
 
 def compare_left_out(file: LeftOutModes, expected: LeftOutModes, reduced: ReducedBody) -> Iterator[Compared]:

@@ -111,6 +111,7 @@ FIELDS: Mapping[str, str] = {
     "recovery.truncated": "recovery-rows",
     "errors.frequency": "error-estimates",
     "errors.bound": "error-estimates",
+    "errors.largest": "error-estimates",
     "errors.shape": "error-estimates",
     "errors.response": "error-estimates",
     "errors.interface_loads": "error-estimates",

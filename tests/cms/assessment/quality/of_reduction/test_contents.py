@@ -229,6 +229,15 @@ def test_loads_to_which_the_modes_answer_exactly_leave_only_rounding_out(solid):
     assert verdict(1e-2) == "fail"
 
 
+def test_largest_errors_of_frequencies_are_compared_by_decades(solid):
+    """They are steps of a rule that rounding may change by one."""
+    errors = solid.reduced.errors
+    largest = np.where(np.isnan(errors.largest), 1.0, errors.largest)
+    for factor, verdict in ((1.0, "pass"), (2.0, "pass"), (1e4, "fail")):
+        other = replace(solid.reduced, errors=replace(errors, largest=largest * factor))
+        assert solid.record("error-estimates", other).verdict == verdict
+
+
 @pytest.mark.parametrize("what", [
     "3C of wrong sign", "4C and 5C beside the diagonal of wrong sign", "P transposed", "stress of the nodes shuffled",
     "stress of the modes shuffled", "stress yz and xy exchanged", "damping none", "labels of the modes shuffled",
