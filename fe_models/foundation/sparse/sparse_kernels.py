@@ -91,8 +91,8 @@ def scalar_entries(indptr, indices, data, p, new_indptr, new_indices, new_data):
 
 
 @jit
-def multiply_rows(indptr, indices, data, first, last, n_components, wide, y):
-    """Write rows c first to c last of y = (S ⊗ 1_c) x, (n, k), with any strides, from the compressed rows of S.
+def multiply_rows(indptr, indices, data, first, last, n_components, wide, y, column):
+    """Write rows c first to c last of (S ⊗ 1_c) x, (n, k), from the compressed rows of S, to y from a column on.
 
     SciPy's own product allocates new memory in every call, and passes over the output row once for every entry.
     wide: x, (n, k), as rows of c k numbers. Four entries are added at a time, so the output row stays in the nearest
@@ -117,4 +117,4 @@ def multiply_rows(indptr, indices, data, first, last, n_components, wide, y):
             e += 1
         for component in range(n_components):
             for j in range(k):
-                y[n_components * row + component, j] = total[component * k + j]
+                y[n_components * row + component, column + j] = total[component * k + j]

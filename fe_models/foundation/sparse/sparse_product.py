@@ -55,25 +55,24 @@ class SymmetricProduct:
         result = np.empty(x.shape)
         for first in range(0, x.shape[1], self._columns):
             block = np.ascontiguousarray(ordered(x[:, first : first + self._columns], "C"))
-            target = result[:, first : first + self._columns]
             if self._n_lead:
-                self._multiply(block[: self._n_lead], target[: self._n_lead], 3)
-                self._add_rest(block, target)
+                self._multiply(block[: self._n_lead], result, first, 3)
+                self._add_rest(block, result[:, first : first + self._columns])
             else:
-                self._multiply(block, target, 1)
+                self._multiply(block, result, first, 1)
         return ordered(result, order)
 
-    def _multiply(self, block: Array, target: Array, n_components: int) -> None:
-        """Write the product row by row; `n_components` rows form one row of the block."""
+    def _multiply(self, block: Array, result: Array, first: int, n_components: int) -> None:
+        """Write the product to columns from `first` on, row by row; `n_components` rows form one row of the block."""
         rows = self._rows
         wide = block.reshape(-1, n_components * block.shape[1])
         if rows.nnz <= SMALL or wide.shape[1] < NARROW:
-            target[:] = (rows @ wide).reshape(target.shape)
+            result[: len(block), first : first + block.shape[1]] = (rows @ wide).reshape(block.shape)
             return
         from fe_models.foundation.sparse.sparse_kernels import multiply_rows
 
         def multiply(share: tuple[int, int]) -> None:
-            multiply_rows(rows.indptr, rows.indices, rows.data, *share, n_components, wide, target)
+            multiply_rows(rows.indptr, rows.indices, rows.data, *share, n_components, wide, result, first)
 
         if self._pool is None:
             multiply(self._shares[0])
