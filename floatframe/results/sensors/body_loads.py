@@ -23,16 +23,14 @@ from floatframe.model.rotations import dot, rotation_matrix, tilde
 from floatframe.model.system import System
 from floatframe.results.joint_coordinates import end_motion
 from floatframe.results.recovery import require_same_modes
-from floatframe.results.sensors.linear_columns import scalar_columns, vector_linear
-from floatframe.results.sensors.measurement import Measurement, unit_words, vector_columns
+from floatframe.results.sensors.linear_columns import load_linear, scalar_columns
+from floatframe.results.sensors.measurement import Measurement, load_columns, unit_words
 from floatframe.results.sensors.stresses import flexible_body
 from floatframe.results.small_motions.rows import LinearColumns, Rows, joined
 from floatframe.results.small_motions.small_motions import SmallMotions
 from floatframe.results.trajectory import Trajectory
 
 __all__ = ["InterfaceForceSensor", "RecoverySensor", "SpringSensor", "case_amplitudes", "interface_loads"]
-
-ROUNDING = 1e-12  #: magnitude, relative to the largest wrench, below which a value is a rounding error
 
 
 def interface_loads(system: System, trajectory: Trajectory, body: FlexibleBody) -> Array:
@@ -170,36 +168,19 @@ class InterfaceForceSensor:
         """Return force and moment over time, as components and magnitudes."""
         body, k = self.place(system)
         require_same_modes(trajectory, body.name, body.reduced)
-        six = interface_loads(system, trajectory, body)[k]
+        vectors = np.split(interface_loads(system, trajectory, body)[k], 2, axis=1)
         if self.axes == "ground":
             R = rotation_matrix(trajectory.body(body.name).p)
-            six = np.concatenate([np.einsum("tab,tb->ta", R, part) for part in (six[:, :3], six[:, 3:])], axis=1)
-        columns: dict[str, Array] = {}
-        units: dict[str, str] = {}
-        for key, values in (("force", six[:, :3]), ("moment", six[:, 3:])):
-            more, unit = vector_columns(values, unit_words(system.units, key), prefix=f"{key} ")
-            columns |= more
-            units |= unit
-        return Measurement(self.name, trajectory.t, columns, units)
+            vectors = [np.einsum("tab,tb->ta", R, part) for part in vectors]
+        return Measurement(self.name, trajectory.t, *load_columns(system.units, *vectors))
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return force and moment as linear functions of wrenches; in body axes Rᵀ (dF + F × theta)."""
+        """Return force and moment as linear functions of wrenches; in body axes also of motions."""
         body, k = self.place(small.system)
         rows, frame = interface_load_rows(small, body)[k], small.frame_place(body.name)
-        now = self.measure(small.system, small.now).columns
-        found = []
-        for first, key in ((0, "force"), (3, "moment")):
-            value, part = np.array([now[f"{key} {axis}"][0] for axis in "xyz"]), rows[first : first + 3]
-            if self.axes == "body":
-                part = (part + frame.rotation.mapped(tilde(frame.axes @ value))).mapped(frame.axes.T)
-            unit = unit_words(small.system.units, key)
-            found.append(vector_linear(part, value, unit, prefix=f"{key} ", least=ROUNDING * small.largest_wrench))
-        force, moment = found
-        return LinearColumns(
-            {**force.columns, **moment.columns},
-            {**force.units, **moment.units},
-            {**force.not_linear, **moment.not_linear},
-        )
+        now = np.split(interface_loads(small.system, small.now, body)[k, 0], 2)
+        values = [frame.axes @ part for part in now]
+        return load_linear(small, (rows[:3], rows[3:]), values, frame if self.axes == "body" else None)
 
     def place(self, system: System) -> tuple[FlexibleBody, int]:
         """Return the body and the index of the interface; `ModelError` with the closest name if it does not exist."""
@@ -319,25 +300,22 @@ class RecoverySensor:
         if small.is_turning:
             why = "recovery rows about a steady rotation: linearise the system at rest"
             return LinearColumns({}, units, dict.fromkeys(units, why))
-        z, R = small.of_file(body.name)
-        frame = small.frame_place(body.name)
+        (z, _), frame = small.of_file(body.name), small.frame_place(body.name)
         places, rates = self.places_and_rates(small, z)
         y = places.mapped(table.dynamic[0][rows]) + rates.mapped(table.dynamic[1][rows])
         y = y + z.rate.rate.mapped(table.dynamic[2][rows])
-        turning = frame.rotation
+        still = small.by_motion(np.zeros((3, small.n_x)))
         on_interfaces, now = interface_load_rows(small, body), interface_loads(small.system, small.now, body)[:, 0]
         for column, load in enumerate(table.loads):
             factor = table.static[rows, column][:, None]
             name, _, component = load.rpartition(" ")
             if name == "gravity":
-                g = gravity_of(small.system)
-                y = y + turning.mapped(tilde(g)).mapped(R.T)[axis_of(component)].mapped(factor)
+                y = y + frame.in_axes(still, gravity_of(small.system))[axis_of(component)].mapped(factor)
             elif component in SIX and name in interface_names(body):
                 k, j = interface_names(body).index(name), SIX.index(component)
                 first = 3 * (j // 3)
-                value = R @ now[k, first : first + 3]
-                part = on_interfaces[k][first : first + 3] + turning.mapped(tilde(value))
-                y = y + part.mapped(R.T)[j % 3].mapped(factor)
+                part = on_interfaces[k][first : first + 3]
+                y = y + frame.in_axes(part, frame.axes @ now[k, first : first + 3])[j % 3].mapped(factor)
             elif load.startswith("load case "):
                 x = np.zeros((1, small.n_x))
                 for k, forces in enumerate(small.forces):

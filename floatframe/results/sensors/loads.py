@@ -5,9 +5,9 @@ from typing import Literal
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
 from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.words import nearest, quoted
+from floatframe.engine.compiling.interface_loads import in_body
 from floatframe.engine.compiling.markers import MarkerData, find_marker, joint_markers
 from floatframe.engine.compiling.pair_forces import bushing_markers
 from floatframe.engine.compiling.system import compiled_system
@@ -19,8 +19,8 @@ from floatframe.model.rotations import tilde
 from floatframe.model.system import System
 from floatframe.results.joint_coordinates import end_motion
 from floatframe.results.recovery import require_same_modes
-from floatframe.results.sensors.linear_columns import NO_SIZE, scalar_columns, vector_linear
-from floatframe.results.sensors.measurement import Measurement, unit_words, vector_columns
+from floatframe.results.sensors.linear_columns import NO_SIZE, load_linear, scalar_columns
+from floatframe.results.sensors.measurement import Measurement, load_columns, unit_words, vector_columns
 from floatframe.results.sensors.stresses import flexible_body
 from floatframe.results.small_motions.rows import LinearColumns
 from floatframe.results.small_motions.small_motions import SmallMotions
@@ -28,7 +28,6 @@ from floatframe.results.trajectory import Energies, Trajectory
 
 __all__ = ["EnergySensor", "ModeSensor", "MomentumSensor", "ReactionSensor"]
 
-ROUNDING = 1e-12  #: magnitude, relative to the largest wrench, below which a value is a rounding error
 ENERGIES = (*Energies.__dataclass_fields__, "total", "balance")
 
 
@@ -56,39 +55,24 @@ class ReactionSensor:
         """Return force and moment over time, as components and magnitudes."""
         self.require_connection(list(trajectory.connection_names))
         reaction = trajectory.reaction(self.of)
-        vectors = {"force ": reaction.force, "moment ": reaction.moment}
+        vectors = reaction.force, reaction.moment
         if self.axes == "marker":
             A = end_motion(system, trajectory, self.end_a(system)).axes
-            vectors = {key: np.einsum("tba,tb->ta", A, values) for key, values in vectors.items()}
-        columns: dict[str, Array] = {}
-        units: dict[str, str] = {}
-        for key, values in vectors.items():
-            more, unit = vector_columns(values, unit_words(system.units, key.strip()), prefix=key)
-            columns |= more
-            units |= unit
-        return Measurement(self.name, trajectory.t, columns, units)
+            vectors = in_body(A, reaction.force), in_body(A, reaction.moment)
+        return Measurement(self.name, trajectory.t, *load_columns(system.units, *vectors))
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return force and moment as linear functions of motions and wrenches; in marker axes Aᵀ (dF + F × theta_A)."""
+        """Return force and moment as linear functions of wrenches; in marker axes also of motions."""
         self.require_connection(list(small.now.connection_names))
         own, reaction = small.wrench(self.of), small.now.reaction(self.of)
-        found = []
-        for key, first, value in (("force ", 0, reaction.force[0]), ("moment ", MOMENT, reaction.moment[0])):
-            rows = small.by_motion(np.zeros((3, small.n_x)))
-            if own.stop - own.start >= first + 3:
-                rows = small.by_wrench(slice(own.start + first, own.start + first + 3))
-            if self.axes == "marker":
-                place = small.place(self.end_a(small.system), self.of)
-                rows = (rows + place.rotation.mapped(tilde(value))).mapped(place.axes.T)
-                value = place.axes.T @ value
-            unit = unit_words(small.system.units, key.strip())
-            found.append(vector_linear(rows, value, unit, prefix=key, least=ROUNDING * small.largest_wrench))
-        force, moment = found
-        return LinearColumns(
-            {**force.columns, **moment.columns},
-            {**force.units, **moment.units},
-            {**force.not_linear, **moment.not_linear},
-        )
+        rows = [
+            small.by_wrench(slice(own.start + first, own.start + first + 3))
+            if own.stop - own.start >= first + 3
+            else small.by_motion(np.zeros((3, small.n_x)))
+            for first in (0, MOMENT)
+        ]
+        place = small.place(self.end_a(small.system), self.of) if self.axes == "marker" else None
+        return load_linear(small, rows, (reaction.force[0], reaction.moment[0]), place)
 
     def require_connection(self, choices: list[str]) -> None:
         """Raise `ModelError`, with the closest name, if the joint or spring does not exist."""

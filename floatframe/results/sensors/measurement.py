@@ -18,7 +18,15 @@ from floatframe.results.small_motions.rows import LinearColumns
 from floatframe.results.small_motions.small_motions import SmallMotions
 from floatframe.results.trajectory import Trajectory
 
-__all__ = ["Measurement", "Sensor", "amplitude_unit", "owner_and_column", "unit_words", "vector_columns"]
+__all__ = [
+    "Measurement",
+    "Sensor",
+    "amplitude_unit",
+    "load_columns",
+    "owner_and_column",
+    "unit_words",
+    "vector_columns",
+]
 
 
 @presented
@@ -143,6 +151,13 @@ def vector_columns(values: Array, unit: str, *, prefix: str = "") -> tuple[dict[
     columns = {f"{prefix}{axis}": values[:, k] for k, axis in enumerate("xyz")}
     columns[f"{prefix}size"] = np.linalg.norm(values, axis=1)
     return columns, dict.fromkeys(columns, unit)
+
+
+def load_columns(units: Units, force: Array, moment: Array) -> tuple[dict[str, Array], dict[str, str]]:
+    """Return the columns of a force and a moment over time, (n_t, 3) each, and their units."""
+    of_force = vector_columns(force, unit_words(units, "force"), prefix="force ")
+    of_moment = vector_columns(moment, unit_words(units, "moment"), prefix="moment ")
+    return of_force[0] | of_moment[0], of_force[1] | of_moment[1]
 
 
 def unit_words(units: Units, what: str) -> str:

@@ -21,7 +21,7 @@ from floatframe.model.bodies.marker_shape import MarkerShape, interface_shape, i
 from floatframe.model.bodies.markers import Marker, body_name
 from floatframe.model.checked_values import unit_vector
 from floatframe.model.joints.rows import TWIST, RowCoordinate
-from floatframe.model.rotations import left_jacobian, rotation_log, tilde
+from floatframe.model.rotations import left_jacobian, rotation_log
 from floatframe.model.system import System
 from floatframe.results.full_turns import through_turns
 from floatframe.results.joint_coordinates import end_motion
@@ -225,16 +225,12 @@ def inverse_left_jacobian(A: Array) -> Array:
 
 
 def relative_rows(place: SmallPlace, other: SmallPlace, quantity: str) -> Rows:
-    """Return three rows for a quantity of a point relative to another point that has no relative motion at present.
-
-    d(Aᵀ (p - p_o)) = Aᵀ (dp - dp_o + (p - p_o) × theta_o)
-    """
-    back = other.axes.T
+    """Return three rows for a quantity of a point relative to another point that has no relative motion at present."""
     if quantity in TURNING:
+        back = other.axes.T
         turn = (place.rotation - other.rotation).mapped(back)
         return turn.rate if quantity == "angular-velocity" else turn.mapped(inverse_left_jacobian(back @ place.axes))
-    arm = tilde(place.position - other.position)
-    rows = (place.moved - other.moved + other.rotation.mapped(arm)).mapped(back)
+    rows = other.in_axes(place.moved - other.moved, place.position - other.position)
     for _ in range(("position", "velocity", "acceleration").index(quantity)):
         rows = rows.rate
     return rows

@@ -72,6 +72,10 @@ class SmallPlace:
     rotation: Rows  #: linearised rotation of the axes in ground axes, as three rows
     spin: Array  #: angular velocity Omega of the steady rotation, ground axes, (3,) [rad/s]
 
+    def in_axes(self, rows: Rows, value: Array) -> Rows:
+        """Return the rows of a vector in the axes A of the place, d(Aᵀ v) = Aᵀ (dv + v × theta), from dv and v."""
+        return (rows + self.rotation.mapped(tilde(value))).mapped(self.axes.T)
+
     def absolute_rate(self, rows: Rows) -> Rows:
         """Return the rate in ground axes of a vector with the given rows in rotating axes."""
         return rows.rate + rows.mapped(tilde(self.spin))
