@@ -23,10 +23,11 @@ from floatframe.model.system import System
 from floatframe.results.coordinate_elements import coupler_motion, user_force_motion
 from floatframe.results.element_motion import element_motion
 from floatframe.results.joint_coordinates import end_motion
+from floatframe.results.place_motion import PlaceMotion
 from floatframe.results.sensors.linear_columns import scalar_columns
 from floatframe.results.sensors.measurement import Measurement, unit_words
 from floatframe.results.small_motions.rows import LinearColumns, Rows, joined
-from floatframe.results.small_motions.small_motions import SmallMotions
+from floatframe.results.small_motions.small_motions import SmallMotions, SmallPlace
 from floatframe.results.trajectory import Trajectory
 
 __all__ = ["BushingSensor", "ControlSensor", "CouplerSensor", "ElementSensor", "output_rows"]
@@ -291,32 +292,19 @@ class BushingSensor:
         theta = rotation_log(np.swapaxes(a.axes, -1, -2) @ b.axes)
         if self.bushing(system).counts_turns:
             theta = counted(trajectory, rotation_of(*ends), theta)
-        C = a.axes @ rotation_exp(share * theta)
-        e = np.einsum("tba,tb->ta", C, b.position - a.position)
-        u = np.einsum("tba,tb->ta", C, b.omega - a.omega)
-        mean = np.einsum("tba,tb->ta", C, (1 - share) * a.omega + share * b.omega)
-        alpha, beta, tau = (x[:, None] for x in scalars(np.einsum("ta,ta->t", theta, theta), share))
-        gamma = mean - tau * np.cross(theta, u)
-        e_rate = np.einsum("tba,tb->ta", C, b.velocity - a.velocity) + np.cross(e, gamma)
-        turning = alpha * u + beta * np.einsum("ta,ta->t", theta, u)[:, None] * theta
-        turning = turning + (share - 0.5) * np.cross(theta, u)
-        columns = np.hstack([e, theta, e_rate, turning]).T
+        e, slopes = deformation_slopes(a, b, theta, share)
+        rates = np.einsum("tij,tj->ti", slopes, np.hstack([a.velocity, a.omega, b.velocity, b.omega]))
+        columns = np.hstack([e, theta, rates]).T
         return Measurement(self.name, trajectory.t, dict(zip(NAMES, columns, strict=True)), self.units(system))
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return de = Cᵀ dd + e × dc and dtheta = S u; the rows of the rates are the derivatives of these rows."""
-        share = AXES[self.bushing(small.system).axes]
+        """Return the change of the deformations; the rows of the rates are the rates of these rows."""
+        now = self.measure(small.system, small.now).columns
+        theta = np.array([now[name][0] for name in DEFORMATIONS[3:]])
         a, b = (small.place(end, self.of) for end in self.ends(small.system))
-        theta = rotation_log(a.axes.T @ b.axes)
-        C = a.axes @ rotation_exp(share * theta)
-        e = C.T @ (b.position - a.position)
-        alpha, beta, tau = (float(x[0]) for x in scalars(np.array([theta @ theta]), share))
-        u = (b.rotation - a.rotation).mapped(C.T)
-        dc = a.rotation.mapped((1 - share) * C.T) + b.rotation.mapped(share * C.T) - u.mapped(tau * tilde(theta))
-        de = (b.moved - a.moved).mapped(C.T) + dc.mapped(tilde(e))
-        turning = u.mapped(alpha * np.eye(3) + beta * np.outer(theta, theta) + (share - 0.5) * tilde(theta))
-        rows = [*(de[k] for k in range(3)), *(turning[k] for k in range(3))]
-        rows += [row.rate for row in rows]
+        _, slopes = deformation_slopes(a, b, theta, AXES[self.bushing(small.system).axes])
+        moved = joined([a.moved, a.rotation, b.moved, b.rotation]).mapped(slopes)
+        rows = [part[k] for part in (moved, moved.rate) for k in range(len(DEFORMATIONS))]
         return scalar_columns(dict(zip(NAMES, rows, strict=True)), self.units(small.system))
 
     def ends(self, system: System) -> tuple[MarkerData, MarkerData]:
@@ -335,6 +323,23 @@ class BushingSensor:
         """Return the units of the columns."""
         kinds = ("length", "angle", "speed", "angular speed")
         return {name: unit_words(system.units, kinds[k // 3]) for k, name in enumerate(NAMES)}
+
+
+def deformation_slopes(
+    a: PlaceMotion | SmallPlace, b: PlaceMotion | SmallPlace, theta: Array, share: float
+) -> tuple[Array, Array]:
+    """Return e, (..., 3), and the derivatives of e and theta by the motions of A and B, (..., 6, 12).
+
+    The motions are dr and dphi of A, then those of B, in ground axes.
+    """
+    C = a.axes @ rotation_exp(share * theta)
+    back, turned = np.swapaxes(C, -1, -2), tilde(theta)
+    e = np.einsum("...ba,...b->...a", C, b.position - a.position)
+    alpha, beta, tau = (x[..., None, None] for x in scalars(np.einsum("...a,...a->...", theta, theta), share))
+    S = alpha * np.eye(3) + beta * theta[..., :, None] * theta[..., None, :] + (share - 0.5) * turned
+    by_a = tilde(e) @ ((1 - share) * np.eye(3) + tau * turned) @ back
+    by_b = tilde(e) @ (share * np.eye(3) - tau * turned) @ back
+    return e, np.block([[-back, by_a, back, by_b], [0.0 * C, -S @ back, 0.0 * C, S @ back]])
 
 
 def counted(trajectory: Trajectory, angles: list[CountedAngle], theta: Array) -> Array:

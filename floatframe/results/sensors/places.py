@@ -25,7 +25,7 @@ from floatframe.model.rotations import left_jacobian, rotation_log
 from floatframe.model.system import System
 from floatframe.results.full_turns import through_turns
 from floatframe.results.joint_coordinates import end_motion
-from floatframe.results.place_motion import PlaceMotion, angle_and_rate, node_motion, normals_of_axis
+from floatframe.results.place_motion import PlaceMotion, angle_and_rate, angle_and_slope, node_motion, normals_of_axis
 from floatframe.results.sensors.linear_columns import scalar_columns, vector_linear
 from floatframe.results.sensors.measurement import Measurement, unit_words, vector_columns
 from floatframe.results.small_motions.rows import LinearColumns, Rows
@@ -314,16 +314,13 @@ class AngleSensor:
         return Measurement(self.name, trajectory.t, {"angle": angle}, {"angle": "rad"})
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the angle for small motions: (C (Y · dD) - S (X · dD))/(C² + S²), dD = (theta_B - theta_A) × D."""
+        """Return the angle as a linear function of small motions."""
         a, b = (
             small_place(small, f"sensor {self.name!r}: {key}", marker)
             for key, marker in (("marker_a", self.marker_a), ("marker_b", self.marker_b))
         )
-        x, y = normals_of_axis(self.axis)
-        X, Y, D = a.axes @ x, a.axes @ y, b.axes @ x
-        C, S = X @ D, Y @ D
-        across = np.cross(D, C * Y - S * X) / (C**2 + S**2)
-        return scalar_columns({"angle": (b.rotation - a.rotation).mapped(across)}, {"angle": "rad"})
+        _, slope = angle_and_slope(a.axes, b.axes, *normals_of_axis(self.axis))
+        return scalar_columns({"angle": (b.rotation - a.rotation).mapped(slope)}, {"angle": "rad"})
 
     def counted_angle(self, system: System) -> CountedAngle:
         """Return the angle that a run counts through full turns, between undeformed bodies."""
