@@ -135,9 +135,9 @@ def assemble(
         if isinstance(mesh, ShellMesh):
             shells = shell_properties(tables.shells, tables.materials)
             given = shells.get("all", shells)
-            body = _shell_body(model, mesh, given, model.name, stages, on_report, stiffeners=beams or None, **others)
+            body = _thin_body(model, mesh, given, model.name, stages, on_report, stiffeners=beams or None, **others)
         else:
-            body = _beam_body(model, mesh, beams.get("all", beams), model.name, stages, on_report, **others)
+            body = _thin_body(model, mesh, beams.get("all", beams), model.name, stages, on_report, **others)
     if not tables.load_cases:
         return body
     with stages("assemble"):
@@ -193,9 +193,9 @@ def _joined_body(model: FEModel, stages: Stages, on_report: OnReport) -> FEBody:
         )
 
 
-def _shell_body(
+def _thin_body(
     model: FEModel,
-    mesh: ShellMesh,
+    mesh: ShellMesh | LineMesh,
     given: Any,
     name: str,
     stages: Stages,
@@ -208,62 +208,30 @@ def _shell_body(
     links: Sequence["RigidLink"] = (),
     places: Mapping[str, InterfaceSection] = MappingProxyType({}),
 ) -> FEBody:
-    """Check a mesh of shells, and return its body."""
+    """Check a mesh of shells or lines, and return its body."""
     used = given.values() if isinstance(given, Mapping) else [given]
-    materials = {made: None for item in used for made in item.materials}
-    materials |= {item.material: None for item in (stiffeners or {}).values()}
-    with stages("check mesh"):
-        report = report_shell(mesh, materials, units=model.units, springs=springs, links=links)
-        if on_report is not None:
-            on_report(report)
-        report.raise_for_errors(accept=model.accept)
-        interfaces = interfaces_of(places, mesh)
-    with stages("assemble"):
-        if is_lumped:
-            given, masses = lumped_shells(mesh, given)
-        return shell_body(
-            mesh,
-            given,
-            name=name,
-            units=model.units,
-            interfaces=interfaces,
-            stiffeners=stiffeners,
-            point_masses=masses,
-            springs=springs,
-            links=links,
-            warp_limit=180.0 if "warped" in model.accept else WARP_LIMIT,
-        )
-
-
-def _beam_body(
-    model: FEModel,
-    mesh: LineMesh,
-    given: Any,
-    name: str,
-    stages: Stages,
-    on_report: OnReport,
-    *,
-    is_lumped: bool = False,
-    masses: Sequence["PointMass"] = (),
-    springs: Sequence["Spring"] = (),
-    links: Sequence["RigidLink"] = (),
-    places: Mapping[str, InterfaceSection] = MappingProxyType({}),
-) -> FEBody:
-    """Check a mesh of lines, and return the body of its beams."""
-    used = given.values() if isinstance(given, Mapping) else [given]
-    with stages("check mesh"):
+    functions: tuple[Any, Any, Any] = report_frame, lumped_beams, beam_body
+    own: dict[str, Any] = {}
+    if isinstance(mesh, ShellMesh):
+        functions = report_shell, lumped_shells, shell_body
+        own = {"stiffeners": stiffeners, "warp_limit": 180.0 if "warped" in model.accept else WARP_LIMIT}
+        materials = {made: None for item in used for made in item.materials}
+        materials |= {item.material: None for item in (stiffeners or {}).values()}
+    else:
         materials = {each.material: None for each in used}
-        report = report_frame(mesh, materials, units=model.units, springs=springs, links=links)
+    check, lump, make = functions
+    with stages("check mesh"):
+        report = check(mesh, materials, units=model.units, springs=springs, links=links)
         if on_report is not None:
             on_report(report)
         report.raise_for_errors(accept=model.accept)
         interfaces = interfaces_of(places, mesh)
     with stages("assemble"):
         if is_lumped:
-            given, masses = lumped_beams(mesh, given)
-        return beam_body(
+            given, masses = lump(mesh, given)
+        return make(
             mesh, given, name=name, units=model.units, interfaces=interfaces, point_masses=masses, springs=springs,
-            links=links,
+            links=links, **own,
         )  # fmt: skip
 
 
@@ -304,10 +272,10 @@ def _parts(model: FEModel, stages: Stages, on_report: OnReport) -> tuple[list[Pa
         add(*_solid_body(model, solid_mesh, of_group.get("all", of_group), name, stages, on_report, rule))
     for name, (groups, given) in _named(f"{model.name} shells", shells):
         shell_mesh = shell_mesh_from_raw(chosen_cells(raw, SHELL_TYPES, groups), path, "", groups, ())
-        add(_shell_body(model, shell_mesh, given, name, stages, on_report, is_lumped="shells" in lumped), shell_mesh)
+        add(_thin_body(model, shell_mesh, given, name, stages, on_report, is_lumped="shells" in lumped), shell_mesh)
     for name, (groups, given) in _named(f"{model.name} beams", beams):
         mesh = line_mesh_from_raw(chosen_cells(raw, BEAM_TYPES, groups), path, "", groups)
-        add(_beam_body(model, mesh, given, name, stages, on_report, is_lumped="lines" in lumped), mesh)
+        add(_thin_body(model, mesh, given, name, stages, on_report, is_lumped="lines" in lumped), mesh)
     for name, (groups, given) in _named(f"{model.name} rods", rods):
         mesh = line_mesh_from_raw(chosen_cells(raw, ("line",), groups), path, "", groups)
         add(rod_body(mesh, given, name=name, units=model.units, is_lumped="rods" in lumped), mesh)

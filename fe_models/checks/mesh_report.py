@@ -21,12 +21,12 @@ from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from fe_models.foundation.units import Units, unit_system
 from fe_models.meshes.cell_shapes import CELL_SHAPES, cell_jacobians, quadrature, shape_values
-from fe_models.meshes.connectivity import Connectivity, coincident_nodes, connectivity
+from fe_models.meshes.connectivity import Connectivity, connectivity
 from fe_models.meshes.mesh import Mesh, used_nodes
 from fe_models.meshes.objects.as_mesh import as_mesh
 from fe_models.meshes.quadratic_mesh import FIRST_ORDER
 
-__all__ = ["CellGeometry", "MeshReport", "cell_geometry", "face_angles", "report_mesh"]
+__all__ = ["CellGeometry", "MeshReport", "face_angles", "report_mesh"]
 
 
 # angles between neighbouring faces of solid cells; small or nearly straight angles make poor elements -----------------
@@ -214,6 +214,8 @@ def report_mesh(
     MaterialError
         If a material names an unknown group, or cells have no material or two materials.
     """
+    from scipy.spatial import cKDTree
+
     mesh = as_mesh(mesh)
     units = unit_system(units) if isinstance(units, str) else units
     used = used_nodes(mesh)
@@ -222,14 +224,19 @@ def report_mesh(
     X = mesh.nodes[used]
     lo, hi = X.min(axis=0), X.max(axis=0)
     size = float(np.linalg.norm(hi - lo))
-    geometry = {kind: cell_geometry(mesh, kind) for kind in mesh.cells}
+    geometry = {}
+    for kind, cells in mesh.cells.items():
+        measure = _measure_tetra10 if kind == "tetra10" else partial(_measure, kind)
+        parts = [measure(mesh.nodes[cells[start : start + _CHUNK]]) for start in range(0, len(cells), _CHUNK)]
+        geometry[kind] = CellGeometry(*(frozen(np.concatenate(part)) for part in zip(*parts, strict=True)))
     findings = []
     degenerate = _select(geometry, lambda g: g.flatness <= FLAT)
     inverted = _select(geometry, lambda g: (g.lowest_inside <= ROUNDING) & (g.flatness > FLAT))
     distorted = _select(geometry, lambda g: (g.lowest_inside > ROUNDING) & (g.lowest_at_nodes <= ROUNDING))
     findings += _cell_findings(mesh, inverted, degenerate, distorted)
     links = connectivity(mesh)
-    coincident = coincident_nodes(mesh, COINCIDENCE * size)
+    reach = max(COINCIDENCE * size, 1e-300)
+    coincident = np.flatnonzero(used)[np.isfinite(cKDTree(X).query(X, k=2, distance_upper_bound=reach)[0][:, 1])]
     findings += _link_findings(links, coincident, mesh)
     n_unused = int((~used).sum())
     if n_unused:
@@ -293,14 +300,6 @@ def _first_order(
         return first_order_error(mesh, materials, incompatible_modes=incompatible_modes)
     except MeshError:
         return None
-
-
-def cell_geometry(mesh: Mesh, kind: str) -> CellGeometry:
-    """Return volumes, first moments and smallest Jacobians of all cells of one type."""
-    cells = mesh.cells[kind]
-    measure = _measure_tetra10 if kind == "tetra10" else partial(_measure, kind)
-    parts = [measure(mesh.nodes[cells[start : start + _CHUNK]]) for start in range(0, len(cells), _CHUNK)]
-    return CellGeometry(*(frozen(np.concatenate(part)) for part in zip(*parts, strict=True)))
 
 
 def _measure(kind: str, X: Array) -> tuple[Array, ...]:

@@ -18,7 +18,7 @@ from cms.assessment.compare.evaluation import SharedReference
 from cms.assessment.compare.full_model import ReferenceSolution, read_full_model, reference_digest
 from cms.assessment.compare.pulse import default_pulse
 from cms.assessment.compare.reference import Question, full_results, reference_of, solution
-from cms.assessment.compare.set_result import SetPart, counts_of_parts, joined_parts, set_part, set_result
+from cms.assessment.compare.set_result import SetPart, counts_of_parts, joined_parts, set_part
 from cms.assessment.compare.verdicts import answer, ranking
 from cms.assessment.quality.reference.ports import Ports
 from cms.assessment.quality.reference.transient import Snapshots
@@ -116,7 +116,7 @@ def compare_sets(
             basis = reference_basis(families, full)
             for name, extra in options.items():
                 with clock(name):
-                    results.append(set_result(name, extra, counts, families, basis, reference))
+                    results.append(joined_parts(name, [set_part(name, extra, counts, families, basis, reference)]))
     if source is not None and cache is not None and workers is not None:
         judge = SetJudge(source, str(cache.absolute()), solved.digest, question.key, damping)
         with clock("mode sets") as advance:

@@ -21,7 +21,7 @@ from cms.modes.mode_sets import MODE_SETS
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.tall.columns import in_memory
 
-__all__ = ["SetPart", "counts_of_parts", "joined_parts", "set_part", "set_result"]
+__all__ = ["SetPart", "counts_of_parts", "joined_parts", "set_part"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,18 +33,6 @@ class SetPart:
     refused: Mapping[int, str]  #: reason for each number of modes that is impossible
     error: str  #: reason if the set cannot be assessed at all
     seconds: float
-
-
-def set_result(
-    name: str,
-    options: Mapping[str, Any],
-    counts: Sequence[int],
-    families: Families,
-    basis: ReferenceBasis,
-    reference: SharedReference,
-) -> SetResult:
-    """Return the result of one set; if the set cannot be computed, its sentence gives the reason."""
-    return joined_parts(name, [set_part(name, options, counts, families, basis, reference)])
 
 
 def joined_parts(name: str, parts: Sequence[SetPart]) -> SetResult:
@@ -82,24 +70,8 @@ def set_part(
     basis: ReferenceBasis,
     reference: SharedReference,
 ) -> SetPart:
-    """Return the points of one set, the column count of each family, and the impossible numbers of modes."""
-    began = time.perf_counter()
-    try:
-        points, columns, refused = judged_points(name, options, counts, families, basis, reference)
-    except (CmsError, np.linalg.LinAlgError) as error:
-        return SetPart((), (), {}, str(error), time.perf_counter() - began)
-    return SetPart(tuple(points), tuple(columns), refused, "", time.perf_counter() - began)
-
-
-def judged_points(
-    name: str,
-    options: Mapping[str, Any],
-    counts: Sequence[int],
-    families: Families,
-    basis: ReferenceBasis,
-    reference: SharedReference,
-) -> tuple[list[Point], list[dict[str, int]], dict[int, str]]:
     """Return the points of one set, the column count of each family, and why other numbers are impossible."""
+    began = time.perf_counter()
     make = MODE_SETS[name]
     takes = inspect.signature(make).parameters
     body = families.body
@@ -134,7 +106,9 @@ def judged_points(
                 judge(n_modes, c, c.columns, modes.labels, modes.groups)
         except CmsError as error:
             refused[n_modes] = str(error)
-    return points[::-1], families_of_columns[::-1], refused
+        except np.linalg.LinAlgError as error:
+            return SetPart((), (), {}, str(error), time.perf_counter() - began)
+    return SetPart(tuple(points[::-1]), tuple(families_of_columns[::-1]), refused, "", time.perf_counter() - began)
 
 
 def refused_words(refused: Mapping[int, str]) -> str:

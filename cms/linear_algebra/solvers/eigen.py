@@ -132,7 +132,11 @@ def eigenmodes(
         raise EigenError(f"eigenmodes: tolerance = {tolerance:g}; expected {TIGHTEST:g} to {LOOSEST:g}")
     is_large_part = wanted.n is not None and 3 * wanted.n > n
     is_dense = n <= SMALL or (is_large_part and n <= LARGEST_DENSE)
-    scale = frequency_scale(K, M)
+    stiffness, diagonal = K.diagonal(), M.diagonal()
+    has_both = (stiffness > 0) & (diagonal > 0)
+    if not has_both.any():
+        raise EigenError("eigenmodes: no dof has both stiffness and mass; expected a body that can vibrate")
+    scale = float(np.median(stiffness[has_both] / diagonal[has_both]))  # near the highest omega² of the mesh
     if shift is None:
         shift = 0.0 if factorization is not None else -(SHIFT_SMALL if is_dense else SHIFT) * scale
     with ExitStack() as stack:
@@ -177,15 +181,6 @@ def eigenmodes(
     return EigenResult(
         omega2, np.sqrt(omega2) / (2 * np.pi), Phi, residuals[:k], n_solves, method, is_proven=wanted.verify
     )
-
-
-def frequency_scale(K: Matrix, M: Matrix) -> float:
-    """Return the median of K_kk / M_kk [1/s²], which is near the highest omega² of the mesh."""
-    stiffness, mass = K.diagonal(), M.diagonal()
-    has_both = (stiffness > 0) & (mass > 0)
-    if not has_both.any():
-        raise EigenError("eigenmodes: no dof has both stiffness and mass; expected a body that can vibrate")
-    return float(np.median(stiffness[has_both] / mass[has_both]))
 
 
 def _proven_modes(

@@ -60,7 +60,13 @@ def couple(body: FEBody) -> FEBody:
     todo = [interface for interface in body.interfaces if interface.dofs is None]
     rigid = [interface for interface in todo if interface.kind == "rigid"]
     distributing = [interface for interface in todo if interface.kind == "distributing"]
-    _require_dofs(body, todo)
+    for interface in todo:
+        without = interface.nodes[~np.isin(interface.nodes, body.dofs[:, 0])]
+        if len(without):
+            raise BodyError(
+                f"body {body.name!r}: interface {interface.name!r}: {len(without)} member nodes have no dofs, first "
+                f"node {body.numbering.called(without[0])}: they follow a rigid link; take the node that leads them"
+            )
     for interface in (*rigid, *distributing):
         _note_reference(body, interface)
     has_rotation = body.dofs[body.dofs[:, 1] >= 3, 0]
@@ -350,19 +356,6 @@ def check_overlap(interfaces: Sequence[Interface], *, numbers: IntArray | None =
             f"interfaces: {'; '.join(shared)}; a node can follow only one interface: make the "
             f"selections smaller, or join the two interfaces to one"
         )
-
-
-def _require_dofs(body: FEBody, interfaces: list[Interface]) -> None:
-    """Raise `BodyError` if members have no dofs because they already follow other nodes."""
-    has_dofs = np.zeros(len(body.nodes), dtype=bool)
-    has_dofs[body.dofs[:, 0]] = True
-    for interface in interfaces:
-        without = interface.nodes[~has_dofs[interface.nodes]]
-        if len(without):
-            raise BodyError(
-                f"body {body.name!r}: interface {interface.name!r}: {len(without)} member nodes have no dofs, first "
-                f"node {body.numbering.called(without[0])}: they follow a rigid link; take the node that leads them"
-            )
 
 
 def require_spread(name: str, kind: str, positions: Array, weights: Array) -> None:

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.ranks.spread_matrix import SpreadBlock, whole_matrix
+from fe_models.foundation.ranks.spread_matrix import SpreadBlock
 from fe_models.foundation.tall.columns import elsewhere
 from fe_models.foundation.threads import in_threads
 
@@ -56,7 +56,8 @@ def spread_block(A: Any) -> SpreadBlock | None:
 
 def principal_block(A: sp.csc_array, index: IntArray) -> sp.csc_array:
     """Return A[index][:, index], (n, n), with sorted row indices; the index may have any order."""
-    A = whole_matrix(A)
+    if not sp.issparse(A):
+        A = A.whole()
     n = len(index)
     if n == A.shape[0] and (index[1:] > index[:-1]).all():
         return A

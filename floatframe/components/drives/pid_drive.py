@@ -13,7 +13,7 @@ from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.elements import Element, ElementLaw, Placed
 from floatframe.model.elements.pairs import add_axial_force, add_torque, axial_motion, direction_of, turning_speed
-from floatframe.model.elements.unit_names import in_units, outputs_in
+from floatframe.model.elements.unit_names import outputs_in, states_in
 
 __all__ = ["PidDrive"]
 
@@ -64,9 +64,7 @@ class PidDrive(Element):
         return ElementLaw(
             function=pid_drive_law,
             data=[mode, self.time_constant, *shaft, *self.controller.numbers(1 / placed.units.time)],
-            states=[name for name, _, _ in states],
-            start=[start for _, _, start in states],
-            state_units=in_units(placed.units, [unit for _, unit, _ in states]),
+            **states_in(placed.units, states),
             **outputs_in(placed.units, outputs),
             tangent="complex",
             acts=("moment", "moment") if mode in (ANGLE, SPEED) else ("wrench", "wrench"),

@@ -15,7 +15,7 @@ from floatframe.model.checked_values import array_of_shape
 from floatframe.model.elements import Element, ElementLaw, Placed
 from floatframe.model.elements.curves import function_at, function_numbers, grid_at, grid_numbers
 from floatframe.model.elements.pairs import add_torque, direction_of, turning_speed
-from floatframe.model.elements.unit_names import in_units, outputs_in
+from floatframe.model.elements.unit_names import outputs_in, states_in
 from floatframe.model.functions.time_functions import TimeFunction
 
 __all__ = ["TorqueMap"]
@@ -107,9 +107,7 @@ class TorqueMap(Element):
         return ElementLaw(
             function=torque_map_law,
             data=[*head, *torque, *efficiency, *supply],
-            states=[name for name, _, _ in states],
-            start=[start for _, _, start in states],
-            state_units=in_units(placed.units, [unit for _, unit, _ in states]),
+            **states_in(placed.units, states),
             **outputs_in(placed.units, OUTPUTS),
             tangent="complex",
             acts=("moment", "moment"),

@@ -5,7 +5,7 @@ from typing import Any
 
 from fe_models.foundation.units import Dimensions, Units, unit_words
 
-__all__ = ["in_units", "outputs_in"]
+__all__ = ["in_units", "outputs_in", "states_in"]
 
 DIMENSIONS = {
     "m": Dimensions(0, 1, 0),
@@ -40,6 +40,12 @@ def outputs_in(units: Units, outputs: Mapping[str, str] | Iterable[tuple[str, st
     """Return `outputs` and `output_units` of a law, from SI unit names by output."""
     found = dict(outputs)
     return {"outputs": tuple(found), "output_units": in_units(units, list(found.values()))}
+
+
+def states_in(units: Units, states: Sequence[tuple[str, str, float]]) -> dict[str, Any]:
+    """Return `states`, `start` and `state_units` of a law, from name, SI unit name and start of each state."""
+    names, named, start = zip(*states, strict=True) if states else ((), (), ())
+    return {"states": names, "start": start, "state_units": in_units(units, named)}
 
 
 def in_unit(units: Units, name: str) -> str:
