@@ -11,7 +11,7 @@ Described in `floatframe.model.joints.orientation_joints`.
 """
 
 from floatframe.engine.kernels.compiler.compilation import inner
-from floatframe.engine.kernels.joints.held_rows import product, product_rates
+from floatframe.engine.kernels.joints.held_rows import axis_rates, product, product_rates
 from floatframe.engine.kernels.joints.relative_motion import direction
 from floatframe.engine.kernels.vector import add, cross, dot, put, scaled, sub, vector
 
@@ -31,16 +31,11 @@ def equal_turn_value(model, work, k, a, b):
 @inner
 def equal_turn_rates(model, work, k, a, b):
     """Return the rates of EQUAL_TURN."""
-    rows, markers, zero = model.rows, work.markers, (0.0, 0.0, 0.0)
-    o, p = vector(markers.omega[a]), vector(markers.omega[b])
-    E, Z, D, U = (
-        direction(markers, a, rows.x[k]),
-        direction(markers, a, rows.z[k]),
-        direction(markers, b, rows.y[k]),
-        direction(markers, b, rows.u[k]),
-    )
-    _, beta_1 = product_rates(o, p, E, zero, zero, U)
-    _, beta_2 = product_rates(o, p, Z, zero, zero, D)
+    rows, markers = model.rows, work.markers
+    E, Z = axis_rates(markers, a, vector(rows.x[k])), axis_rates(markers, a, vector(rows.z[k]))
+    D, U = axis_rates(markers, b, vector(rows.y[k])), axis_rates(markers, b, vector(rows.u[k]))
+    _, beta_1 = product_rates(E, U)
+    _, beta_2 = product_rates(Z, D)
     return 0.0, beta_1 - beta_2
 
 

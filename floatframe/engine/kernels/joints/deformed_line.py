@@ -22,7 +22,7 @@ Described in `floatframe.model.joints.sliding`.
 """
 
 from floatframe.engine.kernels.compiler.compilation import inner
-from floatframe.engine.kernels.joints.held_rows import turned_twice
+from floatframe.engine.kernels.joints.held_rows import ZERO, axis_rates, product_rates
 from floatframe.engine.kernels.joints.relative_motion import direction, distance, prescribed, relative_velocity
 from floatframe.engine.kernels.marker import bent_bias, pose_on_body, shape
 from floatframe.engine.kernels.rotation import left_jacobian, left_jacobian_derivative
@@ -264,8 +264,8 @@ def normal(model, work, row, a):
 @inner
 def line_value(model, work, k, a, b):
     """Return the value of LINE, n_i · d; the axes of A do not contribute, because A follows the point of B."""
-    n, zero = normal(model, work, k, a), (0.0, 0.0, 0.0)
-    return dot(n, distance(work.markers, a, b)), n, zero, zero
+    n = normal(model, work, k, a)
+    return dot(n, distance(work.markers, a, b)), n, ZERO, ZERO
 
 
 @inner
@@ -313,11 +313,10 @@ def line_turn_rates(model, work, k, a, b):
     E, D = direction(work.markers, a, rows.x[k]), direction(work.markers, b, rows.y[k])
     m, kappa, s_dot = cross(E, D), vector(line.kappa[j]), line.s_dot[j]
     rate, second, _ = place_rates(model, work, a)
-    omega_a, p = vector(work.markers.omega[a]), vector(work.markers.omega[b])
-    o = add(omega_a, scaled(s_dot, kappa))
+    o = add(vector(work.markers.omega[a]), scaled(s_dot, kappa))
+    E_dot = cross(o, E)
     turning = second * dot(m, kappa) + dot(m, vector(line.turning[j]))
-    D_dot = cross(p, D)
-    beta = dot(turned_twice(o, E), D) + 2 * dot(cross(o, E), D_dot) + dot(E, cross(p, D_dot))
+    _, beta = product_rates((E, ZERO, E_dot, cross(o, E_dot)), axis_rates(work.markers, b, vector(rows.y[k])))
     return rate * dot(m, kappa), turning + beta
 
 

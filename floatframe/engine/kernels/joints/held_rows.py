@@ -12,10 +12,12 @@ The force n on B, -n on A, with the moments m_b, m_a, is its unit reaction. A ki
     rates   dg/dt, beta
 
 A row that constrains a velocity (ROLL) has the same form: g is the velocity, n, m_a, m_b are its derivatives by the
-velocities of the markers, and beta is its rate at zero accelerations. With E = A_A x, Z = A_A z, D = A_B y,
-omega_A = o, omega_B = p, and the rates E' = R_A e' and E'' of E relative to A,
+velocities of the markers, and beta is its rate at zero accelerations.
 
-    E_dot = o × E + E',   E_ddot - alpha × E = o × (o × E) + 2 o × E' + E''
+Most rows are products of two vectors, each fixed in A, fixed in B, or d. A direction E of A may also rotate relative to
+A, with the rates E_t and E_tt. With omega_A = o, the product rule needs
+
+    E_dot = o × E + E_t,   E_ddot - alpha × E = o × (o × E) + 2 o × E_t + E_tt
 """
 
 import math
@@ -27,64 +29,90 @@ from floatframe.engine.kernels.joints.relative_motion import (
     direction,
     distance,
     prescribed,
+    prescribed_at,
     relative_velocity,
 )
 from floatframe.engine.kernels.vector import add, cross, dot, scaled, sub, turned, vector
+from floatframe.model.joints.rows.kinds import DOT, EQUAL_TURN, TURN_B
 
 __all__ = [
+    "ZERO",
     "angle_rates",
-    "angle_value",
+    "axis_rates",
+    "directions",
     "distance_rates",
     "distance_value",
+    "dot_value",
     "point_rates",
     "point_value",
+    "product",
+    "product_rates",
+    "rates_of",
     "screw_rates",
     "screw_value",
     "slide_rates",
     "slide_value",
-    "turn_b_rates",
-    "turn_b_value",
-    "turn_rates",
+    "span_rates",
     "turn_value",
-    "turned_twice",
 ]
 
-
-@inner
-def turned_twice(omega, x):
-    """Return omega × (omega × x)."""
-    return cross(omega, cross(omega, x))
+ZERO = (0.0, 0.0, 0.0)
 
 
-@inner
-def along_rates(markers, a, b, E):
-    """Return the velocity terms beta of E · d with E fixed in A."""
-    omega = vector(markers.omega[a])
-    d, v = distance(markers, a, b), relative_velocity(markers, a, b)
-    return dot(turned_twice(omega, E), d) + 2 * dot(cross(omega, E), v)
+# products of two vectors ----------------------------------------------------------------------------------------------
 
 
 @small
 def product(E, D):
     """Return E · D with its derivatives, E fixed in A and D in B."""
     m = cross(E, D)
-    return dot(E, D), (0.0, 0.0, 0.0), m, scaled(-1.0, m)
+    return dot(E, D), ZERO, m, scaled(-1.0, m)
+
+
+@small
+def fixed(x):
+    """Return a direction of a marker with its rates relative to it, which are zero."""
+    return vector(x), ZERO, ZERO
 
 
 @inner
-def product_rates(o, p, E, E_1, E_2, D):
-    """Return dg/dt and the velocity terms beta of E · D; E_1, E_2: rates of E relative to A."""
-    E_dot, D_dot = add(cross(o, E), E_1), cross(p, D)
-    E_ddot = add(add(turned_twice(o, E), scaled(2.0, cross(o, E_1))), E_2)
-    return dot(E_1, D), dot(E_ddot, D) + 2 * dot(E_dot, D_dot) + dot(E, cross(p, D_dot))
+def rates_of(markers, m, e):
+    """Return E, E_t, E_dot and E_ddot - alpha × E in ground axes; e: a direction of marker m and its relative rates."""
+    A, omega = markers.A[m], vector(markers.omega[m])
+    E, E_t, E_tt = turned(A, e[0]), turned(A, e[1]), turned(A, e[2])
+    along = cross(omega, E)
+    return E, E_t, add(along, E_t), add(cross(omega, add(along, scaled(2.0, E_t))), E_tt)
+
+
+@inner
+def axis_rates(markers, m, x):
+    """Return the rates of direction x of marker m as `rates_of`."""
+    E, omega = turned(markers.A[m], x), vector(markers.omega[m])
+    E_dot = cross(omega, E)
+    return E, ZERO, E_dot, cross(omega, E_dot)
+
+
+@inner
+def span_rates(markers, a, b):
+    """Return d and its rates as `rates_of`."""
+    return distance(markers, a, b), ZERO, relative_velocity(markers, a, b), ZERO
+
+
+@inner
+def product_rates(P, Q):
+    """Return dg/dt and beta of P · Q from the vectors and their rates."""
+    beta = dot(P[3], Q[0]) + 2 * dot(P[2], Q[2]) + dot(P[0], Q[3])
+    return dot(P[1], Q[0]) + dot(P[0], Q[1]), beta
+
+
+# rows -----------------------------------------------------------------------------------------------------------------
 
 
 @small
 def point_value(model, work, k, a, b):
     """Return the value of POINT: -x · d, with x in ground axes."""
     x = vector(model.rows.x[k])
-    zero = (0.0, 0.0, 0.0)
-    return -dot(x, distance(work.markers, a, b)), scaled(-1.0, x), zero, zero
+    return -dot(x, distance(work.markers, a, b)), scaled(-1.0, x), ZERO, ZERO
 
 
 @inner
@@ -94,7 +122,32 @@ def point_rates(model, work, k, a, b):
 
 
 @small
-def angle_value(model, work, k, a, b):
+def directions(model, k, t):
+    """Return the directions in A and in B whose product row k constrains, with their relative rates.
+
+    DOT: x and y. EQUAL_TURN, first product: x and u. TURN: x cos f + z sin f and y. TURN_B measures f from B: y and
+    x cos f - z sin f.
+    """
+    kind, y = model.rows.kind[k], fixed(model.rows.y[k])
+    if kind == DOT:
+        return fixed(model.rows.x[k]), y
+    if kind == EQUAL_TURN:
+        return fixed(model.rows.x[k]), fixed(model.rows.u[k])
+    e = turning(model, k, t, -1.0 if kind == TURN_B else 1.0)
+    return (y, e) if kind == TURN_B else (e, y)
+
+
+@inner
+def turning(model, k, t, sense):
+    """Return x cos f + z sin f with its rates, f: the prescribed angle times the sense."""
+    f, rate, second = prescribed_at(model, k, t)
+    c, s, x, z = math.cos(f), sense * math.sin(f), vector(model.rows.x[k]), vector(model.rows.z[k])
+    e, n = add(scaled(c, x), scaled(s, z)), sub(scaled(c, z), scaled(s, x))
+    return e, scaled(sense * rate, n), sub(scaled(sense * second, n), scaled(rate * rate, e))
+
+
+@small
+def dot_value(model, work, k, a, b):
     """Return the value of DOT: E · D - c."""
     rows, markers = model.rows, work.markers
     g, n, m_a, m_b = product(direction(markers, a, rows.x[k]), direction(markers, b, rows.y[k]))
@@ -102,54 +155,17 @@ def angle_value(model, work, k, a, b):
 
 
 @inner
-def angle_rates(model, work, k, a, b):
-    """Return the rates of DOT."""
-    rows, markers = model.rows, work.markers
-    E, D, zero = direction(markers, a, rows.x[k]), direction(markers, b, rows.y[k]), (0.0, 0.0, 0.0)
-    return product_rates(vector(markers.omega[a]), vector(markers.omega[b]), E, zero, zero, D)
-
-
-@inner
-def turning_direction(model, work, k, a, sense):
-    """Return E cos f + Z sin f with its derivatives E', E'' by f, ground axes; sense -1: f is measured from B."""
-    f, rate, second = prescribed(model, work, k)
-    c, s, x, z = math.cos(f), sense * math.sin(f), vector(model.rows.x[k]), vector(model.rows.z[k])
-    E = turned(work.markers.A[a], add(scaled(c, x), scaled(s, z)))
-    N = turned(work.markers.A[a], sub(scaled(c, z), scaled(s, x)))
-    return E, scaled(sense * rate, N), sub(scaled(sense * second, N), scaled(rate * rate, E))
-
-
-@small
 def turn_value(model, work, k, a, b):
-    """Return the value of TURN: (E cos f + Z sin f) · D."""
-    E, _, _ = turning_direction(model, work, k, a, 1.0)
-    return product(E, direction(work.markers, b, model.rows.y[k]))
+    """Return the value of TURN or TURN_B: E · D."""
+    e, y = directions(model, k, work.state.time)
+    return product(turned(work.markers.A[a], e[0]), turned(work.markers.A[b], y[0]))
 
 
 @inner
-def turn_rates(model, work, k, a, b):
-    """Return the rates of TURN."""
-    markers = work.markers
-    E, E_1, E_2 = turning_direction(model, work, k, a, 1.0)
-    D = direction(markers, b, model.rows.y[k])
-    return product_rates(vector(markers.omega[a]), vector(markers.omega[b]), E, E_1, E_2, D)
-
-
-@inner
-def turn_b_value(model, work, k, a, b):
-    """Return the value of TURN_B, which is TURN with A and B exchanged; A rotates backwards relative to B."""
-    E, _, _ = turning_direction(model, work, k, b, -1.0)
-    g, n, m_b, m_a = product(E, direction(work.markers, a, model.rows.y[k]))
-    return g, n, m_a, m_b
-
-
-@inner
-def turn_b_rates(model, work, k, a, b):
-    """Return the rates of TURN_B."""
-    markers = work.markers
-    E, E_1, E_2 = turning_direction(model, work, k, b, -1.0)
-    D = direction(markers, a, model.rows.y[k])
-    return product_rates(vector(markers.omega[b]), vector(markers.omega[a]), E, E_1, E_2, D)
+def angle_rates(model, work, k, a, b):
+    """Return the rates of DOT, TURN or TURN_B."""
+    e, y = directions(model, k, work.state.time)
+    return product_rates(rates_of(work.markers, a, e), rates_of(work.markers, b, y))
 
 
 @small
@@ -158,7 +174,7 @@ def slide_value(model, work, k, a, b):
     markers = work.markers
     f, _, _ = prescribed(model, work, k)
     E, d = direction(markers, a, model.rows.x[k]), distance(markers, a, b)
-    return dot(E, d) - f, E, cross(E, d), (0.0, 0.0, 0.0)
+    return dot(E, d) - f, E, cross(E, d), ZERO
 
 
 @inner
@@ -166,15 +182,16 @@ def slide_rates(model, work, k, a, b):
     """Return the rates of SLIDE."""
     markers = work.markers
     _, rate, second = prescribed(model, work, k)
-    return -rate, along_rates(markers, a, b, direction(markers, a, model.rows.x[k])) - second
+    _, beta = product_rates(axis_rates(markers, a, vector(model.rows.x[k])), span_rates(markers, a, b))
+    return -rate, beta - second
 
 
 @inner
 def distance_value(model, work, k, a, b):
     """Return the value of DISTANCE: (d · d/f - f)/2."""
     f, _, _ = prescribed(model, work, k)
-    d, zero = distance(work.markers, a, b), (0.0, 0.0, 0.0)
-    return 0.5 * (dot(d, d) / f - f), scaled(1.0 / f, d), zero, zero
+    d = distance(work.markers, a, b)
+    return 0.5 * (dot(d, d) / f - f), scaled(1.0 / f, d), ZERO, ZERO
 
 
 @inner
@@ -202,5 +219,5 @@ def screw_value(model, work, k, a, b):
 @inner
 def screw_rates(model, work, k, a, b):
     """Return the rates of SCREW; the second rate of the angle is the one for parallel axes."""
-    markers = work.markers
-    return 0.0, along_rates(markers, a, b, axis_between(model.rows, markers, k, a))
+    axis = cross(vector(model.rows.x[k]), vector(model.rows.z[k]))
+    return product_rates(axis_rates(work.markers, a, axis), span_rates(work.markers, a, b))

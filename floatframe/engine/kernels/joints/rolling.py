@@ -13,7 +13,7 @@ Described in `floatframe.model.joints.rolling_disc`.
 """
 
 from floatframe.engine.kernels.compiler.compilation import inner
-from floatframe.engine.kernels.joints.held_rows import turned_twice
+from floatframe.engine.kernels.joints.held_rows import axis_rates, product_rates, span_rates
 from floatframe.engine.kernels.joints.relative_motion import direction, distance, put_pair, relative_velocity
 from floatframe.engine.kernels.vector import add, cross, dot, norm, put, put_sum, scaled, sub, vector
 from floatframe.model.joints.rows.kinds import FORCE, MOMENT_B
@@ -48,13 +48,6 @@ def rim_velocity(markers, a, b, rho):
 
 
 @inner
-def rim_rates(markers, a, b, N, n):
-    """Return the rates of N, n and c."""
-    N_dot, n_dot = cross(vector(markers.omega[a]), N), cross(vector(markers.omega[b]), n)
-    return N_dot, n_dot, dot(N_dot, n) + dot(N, n_dot)
-
-
-@inner
 def height_value(model, work, k, a, b):
     """Return the value of RIM_HEIGHT, whose change by the tilt is d(-R s) = R c/s dc."""
     rows, markers = model.rows, work.markers
@@ -68,12 +61,12 @@ def height_value(model, work, k, a, b):
 def height_rates(model, work, k, a, b):
     """Return the rates of RIM_HEIGHT."""
     rows, markers = model.rows, work.markers
-    N, n, c, s, _ = rim(rows, markers, k, a, b)
-    N_dot, n_dot, c_dot = rim_rates(markers, a, b, N, n)
-    N_ddot, n_ddot = turned_twice(vector(markers.omega[a]), N), turned_twice(vector(markers.omega[b]), n)
-    c_ddot = dot(N_ddot, n) + 2 * dot(N_dot, n_dot) + dot(N, n_ddot)
+    _, _, c, s, _ = rim(rows, markers, k, a, b)
+    N, n = axis_rates(markers, a, vector(rows.z[k])), axis_rates(markers, b, vector(rows.y[k]))
+    _, c_ddot = product_rates(N, n)
+    _, along = product_rates(N, span_rates(markers, a, b))
+    c_dot = dot(N[2], n[0]) + dot(N[0], n[2])
     s_ddot = -(c_dot * c_dot + c * c_ddot) / s - c * c * c_dot * c_dot / (s * s * s)
-    along = dot(N_ddot, distance(markers, a, b)) + 2 * dot(N_dot, relative_velocity(markers, a, b))
     return 0.0, along - rows.c[k] * s_ddot
 
 
@@ -96,8 +89,9 @@ def roll_rates(model, work, k, a, b):
     """Return the rates of ROLL: rho_dot = -R u_dot, u_dot = (N_dot - c_dot n - c n_dot)/s + u c c_dot/s²."""
     rows, markers = model.rows, work.markers
     N, n, c, s, rho = rim(rows, markers, k, a, b)
-    N_dot, n_dot, c_dot = rim_rates(markers, a, b, N, n)
     omega_a, omega_b, R = vector(markers.omega[a]), vector(markers.omega[b]), rows.c[k]
+    N_dot, n_dot = cross(omega_a, N), cross(omega_b, n)
+    c_dot = dot(N_dot, n) + dot(N, n_dot)
     turning = sub(sub(N_dot, scaled(c_dot, n)), scaled(c, n_dot))
     rho_dot = add(scaled(-R / s, turning), scaled(c * c_dot / (s * s), rho))
     t, v = direction(markers, a, rows.x[k]), relative_velocity(markers, a, b)

@@ -104,12 +104,14 @@ class Wrench(NamedTuple):
     derivatives: Function  #: writes the derivatives, (model, work, k, a, b, w, c_k, by, V)
 
 
+TURNS = Held(held_rows.turn_value, held_rows.angle_rates)
+GAUGES = Wrench(wrench_rows.gauge_value, wrench_rows.gauge_derivatives)
 LOADED = Wrench(loaded_rows.loaded_value, loaded_rows.loaded_derivatives)
 HELD = {
     POINT: Held(held_rows.point_value, held_rows.point_rates),
-    DOT: Held(held_rows.angle_value, held_rows.angle_rates),
-    TURN: Held(held_rows.turn_value, held_rows.turn_rates),
-    TURN_B: Held(held_rows.turn_b_value, held_rows.turn_b_rates),
+    DOT: Held(held_rows.dot_value, held_rows.angle_rates),
+    TURN: TURNS,
+    TURN_B: TURNS,
     SLIDE: Held(held_rows.slide_value, held_rows.slide_rates),
     DISTANCE: Held(held_rows.distance_value, held_rows.distance_rates),
     SCREW: Held(held_rows.screw_value, held_rows.screw_rates),
@@ -120,9 +122,9 @@ HELD = {
     LINE_TURN: Held(deformed_line.line_turn_value, deformed_line.line_turn_rates),
 }
 WRENCH = {
-    GAUGE: Wrench(wrench_rows.gauge_value, wrench_rows.gauge_derivatives),
-    GAUGE_B: Wrench(wrench_rows.gauge_b_value, wrench_rows.gauge_b_derivatives),
-    THREAD: Wrench(wrench_rows.thread_value, wrench_rows.thread_derivatives),
+    GAUGE: GAUGES,
+    GAUGE_B: GAUGES,
+    THREAD: GAUGES,
     ARM: Wrench(wrench_rows.arm_value, wrench_rows.arm_derivatives),
     ROD: Wrench(wrench_rows.rod_value, wrench_rows.rod_derivatives),
     RIM: Wrench(rolling.rim_value, rolling.rim_derivatives),

@@ -8,72 +8,46 @@ d(E · W) = dphi · (E × W) + E · dW.
 
 from floatframe.engine.kernels.compiler.compilation import inner, small
 from floatframe.engine.kernels.joints.relative_motion import direction, distance, put_pair
-from floatframe.engine.kernels.vector import add, cross, dot, put, scaled, sub, vector
-from floatframe.model.joints.rows.kinds import FORCE, MOMENT, MOMENT_B
+from floatframe.engine.kernels.vector import add, cross, dot, put, put_sum, scaled, sub, vector
+from floatframe.model.joints.rows.kinds import FORCE, GAUGE_B, MOMENT, MOMENT_B, THREAD
 
 __all__ = [
     "arm_derivatives",
     "arm_value",
-    "gauge_b_derivatives",
-    "gauge_b_value",
     "gauge_derivatives",
     "gauge_value",
     "rod_derivatives",
     "rod_value",
-    "thread_derivatives",
-    "thread_value",
 ]
 
 
 @small
+def gauge(rows, markers, k, a, b):
+    """Return E, part and c of row k, E · (part + c F) = 0. E is fixed in B for GAUGE_B; only THREAD has c."""
+    if rows.kind[k] == GAUGE_B:
+        return direction(markers, b, rows.y[k]), rows.part[k], 0.0
+    E = direction(markers, a, rows.x[k])
+    if rows.kind[k] == THREAD:
+        return E, MOMENT_B, rows.c[k]
+    return E, rows.part[k], 0.0
+
+
+@small
 def gauge_value(model, work, k, a, b, w):
-    """Return the value of GAUGE: E · part."""
-    rows = model.rows
-    return dot(direction(work.markers, a, rows.x[k]), vector(w[rows.part[k] :]))
+    """Return the value of GAUGE, GAUGE_B or THREAD."""
+    E, part, c = gauge(model.rows, work.markers, k, a, b)
+    g = dot(E, vector(w[part:]))
+    return g if c == 0.0 else g + c * dot(E, vector(w))
 
 
 @small
 def gauge_derivatives(model, work, k, a, b, w, c_k, by, V):
-    """Write the derivatives of GAUGE."""
-    rows = model.rows
-    part, E = rows.part[k], direction(work.markers, a, rows.x[k])
-    put(by.a, 3, scaled(c_k, cross(E, vector(w[part:]))))
+    """Write the derivatives of GAUGE, GAUGE_B or THREAD."""
+    E, part, c = gauge(model.rows, work.markers, k, a, b)
+    turn = cross(E, add(vector(w[part:]), scaled(c, vector(w))))
+    put(by.b if model.rows.kind[k] == GAUGE_B else by.a, 3, scaled(c_k, turn))
     put(V, part, E)
-
-
-@inner
-def gauge_b_value(model, work, k, a, b, w):
-    """Return the value of GAUGE_B: D · part."""
-    rows = model.rows
-    return dot(direction(work.markers, b, rows.y[k]), vector(w[rows.part[k] :]))
-
-
-@inner
-def gauge_b_derivatives(model, work, k, a, b, w, c_k, by, V):
-    """Write the derivatives of GAUGE_B."""
-    rows = model.rows
-    part, D = rows.part[k], direction(work.markers, b, rows.y[k])
-    put(by.b, 3, scaled(c_k, cross(D, vector(w[part:]))))
-    put(V, part, D)
-
-
-@inner
-def thread_value(model, work, k, a, b, w):
-    """Return the value of THREAD: E · (N + c F)."""
-    rows = model.rows
-    W = add(vector(w[MOMENT_B:]), scaled(rows.c[k], vector(w)))
-    return dot(direction(work.markers, a, rows.x[k]), W)
-
-
-@inner
-def thread_derivatives(model, work, k, a, b, w, c_k, by, V):
-    """Write the derivatives of THREAD."""
-    rows = model.rows
-    c, E = rows.c[k], direction(work.markers, a, rows.x[k])
-    W = add(vector(w[MOMENT_B:]), scaled(c, vector(w)))
-    put(by.a, 3, scaled(c_k, cross(E, W)))
-    put(V, MOMENT_B, E)
-    put(V, FORCE, scaled(c, E))
+    put_sum(V, FORCE, scaled(c, E))
 
 
 @small

@@ -10,9 +10,10 @@ angular momentum.
 import math
 
 from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.joints.held_rows import directions
 from floatframe.engine.kernels.joints.relative_motion import distance, prescribed_at
 from floatframe.engine.kernels.joints.row_formulas import HELD, by_code
-from floatframe.engine.kernels.vector import add, cross, dot, scaled, sub, turned, vector
+from floatframe.engine.kernels.vector import add, cross, dot, scaled, turned, vector
 from floatframe.engine.structure_preserving.kernels.markers import (
     add_direction,
     add_pair,
@@ -49,15 +50,6 @@ def held(model, k, t):
     """Return the value that row k prescribes at time t, and its rate."""
     value, rate, _ = prescribed_at(model, k, t)
     return value, rate
-
-
-@inner
-def turn_direction(model, k, t):
-    """Return the direction of a prescribed angle at time t in marker A; TURN_B: in B, with the opposite sign."""
-    angle, _ = held(model, k, t)
-    if model.rows.kind[k] == TURN_B:
-        angle = -angle
-    return add(scaled(math.cos(angle), vector(model.rows.x[k])), scaled(math.sin(angle), vector(model.rows.z[k])))
 
 
 @inner
@@ -117,23 +109,12 @@ def add_reaction(model, discrete, step, k, a, b, f):
     if model.rows.is_length[k]:
         add_pair(step, a, b, scaled(f, force_of_row(model, step, k, a, b)))
         return
-    first, e, second, d = factors(model, step, k, a, b)
-    add_product(model, discrete, step, first, e, second, d, f)
     if kind == EQUAL_TURN:
+        add_product(model, discrete, step, a, vector(model.rows.x[k]), b, vector(model.rows.u[k]), f)
         add_product(model, discrete, step, a, vector(model.rows.z[k]), b, vector(model.rows.y[k]), -f)
-
-
-@inner
-def factors(model, step, k, a, b):
-    """Return marker and direction of both factors of a product row k; EQUAL_TURN: E and U."""
-    kind, x, y = model.rows.kind[k], vector(model.rows.x[k]), vector(model.rows.y[k])
-    if kind == TURN_B:
-        return b, turn_direction(model, k, step.t_force), a, y
-    if kind == TURN:
-        x = turn_direction(model, k, step.t_force)
-    elif kind == EQUAL_TURN:
-        y = vector(model.rows.u[k])
-    return a, x, b, y
+        return
+    e, y = directions(model, k, step.t_force)
+    add_product(model, discrete, step, a, e[0], b, y[0], f)
 
 
 @inner
@@ -156,12 +137,9 @@ def row_rate(model, step, k, a, b, t):
     if kind == DISTANCE:
         d, _ = distances(step, a, b)
         return -0.5 * rate * (dot(d, d) / (value * value) + 1.0)
-    x, y, z = vector(model.rows.x[k]), vector(model.rows.y[k]), vector(model.rows.z[k])
-    if kind == TURN_B:
-        back = add(scaled(math.cos(value), z), scaled(math.sin(value), x))
-        return -rate * dot(turned(step.A_0[b], back), turned(step.A_0[a], y))
-    across = sub(scaled(math.cos(value), z), scaled(math.sin(value), x))
-    return rate * dot(turned(step.A_0[a], across), turned(step.A_0[b], y))
+    e, y = directions(model, k, t)
+    A, B = step.A_0[a], step.A_0[b]
+    return dot(turned(A, e[1]), turned(B, y[0])) + dot(turned(A, e[0]), turned(B, y[1]))
 
 
 @inner
