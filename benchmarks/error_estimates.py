@@ -1,6 +1,6 @@
 """Estimated errors of frequencies and frequency responses against true ones, for all mode sets; and their cost.
 
-python -m benchmarks.error_estimates                  # 60 bodies, all mode sets: some minutes
+python -m benchmarks.error_estimates                  # 60 seeds, bars and panels, all mode sets: some minutes
 python -m benchmarks.error_estimates --cost 12        # a bar of 48 x 12 x 12 bricks of tet10, 50 modes
 """
 
@@ -29,9 +29,9 @@ from cms.reduction.error_estimates import (
 )
 from cms.reduction.mesh_error import mesh_errors
 from cms.reduction.reduction import reduce
-from fe_models.body.fe_body import MULTIPLIER, FEBody
+from fe_models.body.fe_body import MULTIPLIER, FEBody, Interface
 from fe_models.errors import FeModelsError
-from tests.bodies import bar
+from tests.bodies import STEEL, bar
 from tests.campaign.random_bodies import random_body
 
 LEAST_RESPONSE = 1e-6  #: true error of a response, below which it is rounding
@@ -42,7 +42,7 @@ SETS = [name for name in MODE_SETS if name != "user-basis"]
 
 
 def bodies(n: int) -> Iterator[tuple[int, FEBody]]:
-    """Yield coupled bodies with a seed: random ones of every element, and bars with up to 200 modes."""
+    """Yield coupled bodies with a seed: random ones of every element, bars and panels with up to 200 modes."""
     for seed in range(n):
         try:
             body = fm.couple(random_body(seed).body)
@@ -50,8 +50,23 @@ def bodies(n: int) -> Iterator[tuple[int, FEBody]]:
             continue
         if not (body.dofs[:, 1] == MULTIPLIER).any():  # LAPACK needs a definite matrix
             yield seed, body
-    for seed, kind in enumerate(("tetra10", "hexahedron20", "hexahedron", "wedge15")):
-        yield n + seed, fm.couple(bar(nx=16, ny=3, nz=3, kind=kind))
+    large = [
+        *(bar(nx=16, ny=3, nz=3, kind=kind) for kind in ("tetra10", "hexahedron20", "hexahedron", "wedge15")),
+        *(panel(kind, rise) for kind in ("quad", "triangle") for rise in (0.0, 0.6)),
+    ]
+    for seed, body in enumerate(large):
+        yield n + seed, fm.couple(body)
+
+
+def panel(kind: str, rise: float) -> FEBody:
+    """Return a square plate or a cylindrical panel of shells with rigid interfaces on two edges."""
+    mesh = fm.shells.mapped_shell(lambda u, v: np.stack([u, v, rise * u * (1 - u)], axis=1), 14, 14, kind=kind)
+    ports = [
+        Interface(name, "rigid", edge := np.flatnonzero(mesh.nodes[:, 1] == y), mesh.nodes[edge].mean(axis=0))
+        for name, y in (("left", 0.0), ("right", 1.0))
+    ]
+    steel, units = fm.shells.ShellProperty(0.02, STEEL), fm.unit_system("m-kg-s")
+    return fm.shell_body(mesh, steel, name="panel", units=units, interfaces=ports)
 
 
 def set_of(name: str, families: Families, rng: np.random.Generator) -> Any:

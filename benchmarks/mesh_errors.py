@@ -1,10 +1,11 @@
 """Estimated errors of free frequencies by the mesh against those of a much finer mesh of the same geometry; and cost.
 
-python -m benchmarks.mesh_errors                  # 42 bodies: some minutes
+python -m benchmarks.mesh_errors                  # 60 bodies: some minutes
 python -m benchmarks.mesh_errors --cost 12        # a bar of 48 x 12 x 12 bricks of tet10, 50 modes
 """
 
 import argparse
+import itertools
 import logging
 import time
 import warnings
@@ -68,16 +69,16 @@ def clamped(n: int, kind: str) -> FEBody:
     return fm.couple(bar(nx=4 * n, ny=n, nz=n, length=0.4, width=0.1, height=0.1, kind=kind))
 
 
-def plate(n: int, kind: str, bend: float = 0.0) -> FEBody:
-    """Return a plate, or a cylindrical panel, of shells in general position."""
+def plate(n: int, kind: str, bend: float = 0.0, fold: float = 0.0, thickness: float = 0.02) -> FEBody:
+    """Return a plate, a cylindrical panel or a plate with a fold, of shells in general position; n a multiple of 10."""
 
     def place(u: Array, v: Array) -> Array:
-        return np.stack([u, 0.7 * v, bend * u * (1 - u)], axis=1)
+        return np.stack([u, 0.7 * v, bend * u * (1 - u) + fold * np.minimum(u, 1 - u)], axis=1)
 
-    mesh = fm.shells.mapped_shell(place, n, max(1, (7 * n) // 10), kind=kind)
+    mesh = fm.shells.mapped_shell(place, n, (7 * n) // 10, kind=kind)
     turn = np.linalg.qr(np.random.default_rng(4).normal(size=(3, 3)))[0]
     return fm.shell_body(
-        replace(mesh, nodes=mesh.nodes @ turn.T), fm.shells.ShellProperty(0.02, STEEL), name="plate", units=SI
+        replace(mesh, nodes=mesh.nodes @ turn.T), fm.shells.ShellProperty(thickness, STEEL), name="plate", units=SI
     )
 
 
@@ -116,9 +117,16 @@ def cases() -> Iterator[Case]:
         )
     for kind in ("tetra10", "hexahedron20"):
         yield Case(f"rigid ends {kind}", lambda kind=kind: clamped(2, kind), lambda: clamped(6, "hexahedron20"))
-    for kind in ("quad", "triangle"):
-        yield Case(f"shell {kind}", lambda kind=kind: plate(8, kind), lambda kind=kind: plate(60, kind))
-        yield Case(f"panel {kind}", lambda kind=kind: plate(10, kind, 0.6), lambda kind=kind: plate(60, kind, 0.6))
+    shells: dict[str, dict[str, float]] = {
+        "shell": {}, "panel": {"bend": 0.6}, "fold": {"fold": 0.8}, "thin shell": {"thickness": 0.004},
+        "thick shell": {"thickness": 0.06},
+    }  # fmt: skip
+    for kind, (name, options), n in itertools.product(("quad", "triangle"), shells.items(), (10, 20)):
+        yield Case(
+            f"{name} {kind} {n}",
+            lambda kind=kind, n=n, options=options: plate(n, kind, **options),
+            lambda kind=kind, options=options: plate(60, kind, **options),
+        )
 
 
 def free_modes(body: FEBody, n: int) -> tuple[Array, Array]:
