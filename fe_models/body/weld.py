@@ -1,4 +1,10 @@
-"""Welding of several bodies into one body at their interfaces, for solids and frames."""
+"""Welding of several bodies into one body at their interfaces, for solids and frames.
+
+`fe_models.assembly.join` joins bodies before they are coupled: they share nodes, whose dofs become one (u_parts = S u).
+Coupled bodies share no node. They meet at reference nodes some distance apart, which distributing interfaces move by
+multipliers: one of them follows the other rigidly, and multipliers that lose their node are removed. Both joins place
+the bodies by `side_by_side` and eliminate dofs by `eliminate_dofs`; only the equations between the dofs differ.
+"""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace

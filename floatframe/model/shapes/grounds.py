@@ -76,7 +76,7 @@ class Road:
 
     def __post_init__(self) -> None:
         put = object.__setattr__
-        put(self, "points", points_3("road: points", self.points, 2))
+        put(self, "points", points_3("road: points", self.points))
         put(self, "width", number("road: width", self.width, above=0.0))
         put(self, "up", unit_vector("road: up", self.up))
 
@@ -107,7 +107,7 @@ class Track:
 
     def __post_init__(self) -> None:
         put = object.__setattr__
-        put(self, "points", points_3("track: points", self.points, 2))
+        put(self, "points", points_3("track: points", self.points))
         put(self, "gauge", number("track: gauge", self.gauge, above=0.0))
         put(self, "up", unit_vector("track: up", self.up))
         for name, share in (("rail_height", 0.115), ("sleeper_distance", 0.4)):

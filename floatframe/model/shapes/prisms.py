@@ -9,7 +9,7 @@ from floatframe.errors import ModelError
 from floatframe.model.checked_values import array_of_shape, number, unit_vector
 from floatframe.model.shapes.grids import polygon_triangles
 from floatframe.model.shapes.piece import Piece
-from floatframe.model.shapes.rounds import axes_about, points_2
+from floatframe.model.shapes.rounds import axes_about, finite_points
 
 __all__ = ["Box", "Extrusion", "box_piece"]
 
@@ -46,7 +46,7 @@ class Extrusion:
 
     def __post_init__(self) -> None:
         put = object.__setattr__
-        put(self, "profile", points_2("extrusion: profile", self.profile, 3))
+        put(self, "profile", finite_points("extrusion: profile", self.profile, 3))
         put(self, "length", number("extrusion: length", self.length, above=0.0))
         put(self, "axis", unit_vector("extrusion: axis", self.axis))
 

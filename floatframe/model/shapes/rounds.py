@@ -11,7 +11,7 @@ from floatframe.model.checked_values import number, unit_vector
 from floatframe.model.shapes.grids import grid_triangles
 from floatframe.model.shapes.piece import Piece
 
-__all__ = ["Cylinder", "Revolution", "Sphere", "axes_about", "points_2", "revolved"]
+__all__ = ["Cylinder", "Revolution", "Sphere", "axes_about", "finite_points", "revolved"]
 
 AROUND = 48  #: number of nodes around a circle
 
@@ -57,7 +57,7 @@ class Revolution:
 
     def __post_init__(self) -> None:
         put = object.__setattr__
-        put(self, "profile", points_2("revolution: profile", self.profile, 2))
+        put(self, "profile", finite_points("revolution: profile", self.profile, 2))
         if self.profile[:, 0].min() < 0:
             raise ModelError(f"revolution: profile: expected radii of 0 or more, got {self.profile[:, 0].min():g}")
         put(self, "axis", unit_vector("revolution: axis", self.axis))
@@ -108,13 +108,13 @@ def axes_about(axis: Array) -> tuple[Array, Array, Array]:
     return x, np.cross(z, x), z
 
 
-def points_2(where: str, values: Any, least: int) -> Array:
-    """Return finite pairs of numbers, (n, 2), read-only."""
+def finite_points(where: str, values: Any, least: int, width: int = 2, words: str = "pairs of numbers") -> Array:
+    """Return finite points, (n, width), read-only."""
     try:
         points = np.array(values, dtype=float)
     except (TypeError, ValueError):
         points = np.zeros(0)
-    if points.ndim != 2 or points.shape[1] != 2 or len(points) < least or not np.isfinite(points).all():
-        raise ModelError(f"{where}: expected {least} or more finite pairs of numbers, got shape {points.shape}")
+    if points.ndim != 2 or points.shape[1] != width or len(points) < least or not np.isfinite(points).all():
+        raise ModelError(f"{where}: expected {least} or more finite {words}, got shape {points.shape}")
     points.flags.writeable = False
     return points

@@ -10,6 +10,7 @@ from floatframe.errors import ModelError
 from floatframe.model.checked_values import number
 from floatframe.model.shapes.grids import grid_triangles
 from floatframe.model.shapes.piece import Piece
+from floatframe.model.shapes.rounds import finite_points
 
 __all__ = ["Line", "Tube", "along", "points_3", "swept"]
 
@@ -29,7 +30,7 @@ class Tube:
     is_closed: bool = False  #: whether the last point is connected to the first
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", points_3("tube: points", self.points, 2))
+        object.__setattr__(self, "points", points_3("tube: points", self.points))
         object.__setattr__(self, "radius", number("tube: radius", self.radius, above=0.0))
 
     def pieces(self) -> tuple[Piece, ...]:
@@ -82,18 +83,12 @@ def carried_axes(points: Array, *, is_closed: bool = False) -> Array:
     return np.array(found)
 
 
-def points_3(where: str, values: Any, least: int) -> Array:
+def points_3(where: str, values: Any) -> Array:
     """Return finite points, (n, 3), read-only, without equal consecutive points."""
-    try:
-        points = np.array(values, dtype=float)
-    except (TypeError, ValueError):
-        points = np.zeros(0)
-    if points.ndim != 2 or points.shape[1] != 3 or len(points) < least or not np.isfinite(points).all():
-        raise ModelError(f"{where}: expected {least} or more finite points [x, y, z], got shape {points.shape}")
-    if len(points) > 1 and np.linalg.norm(np.diff(points, axis=0), axis=1).min() == 0:
+    points = finite_points(where, values, 2, 3, "points [x, y, z]")
+    if np.linalg.norm(np.diff(points, axis=0), axis=1).min() == 0:
         k = int(np.linalg.norm(np.diff(points, axis=0), axis=1).argmin())
         raise ModelError(f"{where}: points {k + 1} and {k + 2} are the same, {points[k].tolist()}; remove one")
-    points.flags.writeable = False
     return points
 
 
@@ -108,7 +103,7 @@ class Line:
     is_closed: bool = False  #: whether the last point is connected to the first
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", points_3("line: points", self.points, 2))
+        object.__setattr__(self, "points", points_3("line: points", self.points))
 
     def pieces(self) -> tuple[Piece, ...]:
         """Return the line segments."""
