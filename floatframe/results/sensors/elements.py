@@ -18,7 +18,7 @@ from floatframe.errors import ModelError
 from floatframe.model.forces import Bushing, UserForce
 from floatframe.model.forces.bushing import AXES, DEFORMATIONS
 from floatframe.model.joints.rows import kind_of
-from floatframe.model.rotations import continued_rotation, rotation_exp, rotation_log, tilde
+from floatframe.model.rotations import continued_rotation, dot, rotation_exp, rotation_log
 from floatframe.model.system import System
 from floatframe.results.coordinate_elements import coupler_motion, user_force_motion
 from floatframe.results.element_motion import element_motion
@@ -292,8 +292,8 @@ class BushingSensor:
         theta = rotation_log(np.swapaxes(a.axes, -1, -2) @ b.axes)
         if self.bushing(system).counts_turns:
             theta = counted(trajectory, rotation_of(*ends), theta)
-        e, slopes = deformation_slopes(a, b, theta, share)
-        rates = np.einsum("tij,tj->ti", slopes, np.hstack([a.velocity, a.omega, b.velocity, b.omega]))
+        C, e = deformed_axes(a, b, theta, share)
+        rates = deformation_rates(C, e, theta, share, b.velocity - a.velocity, a.omega, b.omega)
         columns = np.hstack([e, theta, rates]).T
         return Measurement(self.name, trajectory.t, dict(zip(NAMES, columns, strict=True)), self.units(system))
 
@@ -302,8 +302,10 @@ class BushingSensor:
         now = self.measure(small.system, small.now).columns
         theta = np.array([now[name][0] for name in DEFORMATIONS[3:]])
         a, b = (small.place(end, self.of) for end in self.ends(small.system))
-        _, slopes = deformation_slopes(a, b, theta, AXES[self.bushing(small.system).axes])
-        moved = joined([a.moved, a.rotation, b.moved, b.rotation]).mapped(slopes)
+        share = AXES[self.bushing(small.system).axes]
+        unit_motions = np.split(np.eye(9), 3, axis=1)
+        slopes = deformation_rates(*deformed_axes(a, b, theta, share), theta, share, *unit_motions).T
+        moved = joined([b.moved - a.moved, a.rotation, b.rotation]).mapped(slopes)
         rows = [part[k] for part in (moved, moved.rate) for k in range(len(DEFORMATIONS))]
         return scalar_columns(dict(zip(NAMES, rows, strict=True)), self.units(small.system))
 
@@ -325,21 +327,25 @@ class BushingSensor:
         return {name: unit_words(system.units, kinds[k // 3]) for k, name in enumerate(NAMES)}
 
 
-def deformation_slopes(
+def deformed_axes(
     a: PlaceMotion | SmallPlace, b: PlaceMotion | SmallPlace, theta: Array, share: float
 ) -> tuple[Array, Array]:
-    """Return e, (..., 3), and the derivatives of e and theta by the motions of A and B, (..., 6, 12).
-
-    The motions are dr and dphi of A, then those of B, in ground axes.
-    """
+    """Return C, (..., 3, 3), and e, (..., 3)."""
     C = a.axes @ rotation_exp(share * theta)
-    back, turned = np.swapaxes(C, -1, -2), tilde(theta)
-    e = np.einsum("...ba,...b->...a", C, b.position - a.position)
-    alpha, beta, tau = (x[..., None, None] for x in scalars(np.einsum("...a,...a->...", theta, theta), share))
-    S = alpha * np.eye(3) + beta * theta[..., :, None] * theta[..., None, :] + (share - 0.5) * turned
-    by_a = tilde(e) @ ((1 - share) * np.eye(3) + tau * turned) @ back
-    by_b = tilde(e) @ (share * np.eye(3) - tau * turned) @ back
-    return e, np.block([[-back, by_a, back, by_b], [0.0 * C, -S @ back, 0.0 * C, S @ back]])
+    return C, np.einsum("...ba,...b->...a", C, b.position - a.position)
+
+
+def deformation_rates(
+    C: Array, e: Array, theta: Array, share: float, slip: Array, omega_a: Array, omega_b: Array
+) -> Array:  # fmt: skip
+    """Return e' and theta', (..., 6), for d' = slip and angular velocities, (..., 3) each; they are linear in these."""
+    u, v, mean = (
+        np.einsum("...ba,...b->...a", C, x) for x in (omega_b - omega_a, slip, (1 - share) * omega_a + share * omega_b)
+    )
+    alpha, beta, tau = (x[..., None] for x in scalars(dot(theta, theta), share))
+    across = np.cross(theta, u)
+    turning = alpha * u + beta * dot(theta, u)[..., None] * theta + (share - 0.5) * across
+    return np.concatenate([v + np.cross(e, mean - tau * across), turning], axis=-1)
 
 
 def counted(trajectory: Trajectory, angles: list[CountedAngle], theta: Array) -> Array:
