@@ -109,12 +109,10 @@ def add_reaction(model, discrete, step, k, a, b, f):
     if model.rows.is_length[k]:
         add_pair(step, a, b, scaled(f, force_of_row(model, step, k, a, b)))
         return
-    if kind == EQUAL_TURN:
-        add_product(model, discrete, step, a, vector(model.rows.x[k]), b, vector(model.rows.u[k]), f)
-        add_product(model, discrete, step, a, vector(model.rows.z[k]), b, vector(model.rows.y[k]), -f)
-        return
     e, y = directions(model, k, step.t_force)
     add_product(model, discrete, step, a, e[0], b, y[0], f)
+    if kind == EQUAL_TURN:
+        add_product(model, discrete, step, a, vector(model.rows.z[k]), b, vector(model.rows.y[k]), -f)
 
 
 @inner
@@ -138,8 +136,8 @@ def row_rate(model, step, k, a, b, t):
         d, _ = distances(step, a, b)
         return -0.5 * rate * (dot(d, d) / (value * value) + 1.0)
     e, y = directions(model, k, t)
-    A, B = step.A_0[a], step.A_0[b]
-    return dot(turned(A, e[1]), turned(B, y[0])) + dot(turned(A, e[0]), turned(B, y[1]))
+    A_a, A_b = step.A_0[a], step.A_0[b]
+    return dot(turned(A_a, e[1]), turned(A_b, y[0])) + dot(turned(A_a, e[0]), turned(A_b, y[1]))
 
 
 @inner
