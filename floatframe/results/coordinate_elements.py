@@ -66,7 +66,7 @@ def user_force_motion(system: System, trajectory: Trajectory, name: str) -> User
     model, w, force = compiled_system(system).model, unknowns(system, trajectory), forces[u]
     k = len(system.couplers) + u
     values = model.coordinates.row[model.elements.coordinate0[k] : model.elements.coordinate0[k + 1]]
-    states = model.states.row[model.users.state0[u] : model.users.state0[u + 1]]
+    states = model.states.row[model.elements.state0[k] : model.elements.state0[k + 1]]
     return UserForceMotion(
         trajectory.t,
         {each: w[:, row] for each, row in zip(force.coordinates, values, strict=True)},

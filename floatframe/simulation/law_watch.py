@@ -96,16 +96,17 @@ def asked_laws(system: System, compiled: CompiledSystem) -> Iterator[AskedLaw]:
     callbacks = iter(compiled.callbacks)
     for u, force in enumerate(force for force in system.forces if isinstance(force, UserForce)):
         if force.function is not None:
-            yield asked_force(f"forces.{force.name}", compiled, u, len(system.couplers) + u, next(callbacks))
+            yield asked_force(f"forces.{force.name}", compiled, len(system.couplers) + u, next(callbacks))
     for placed in compiled.laws:
         if not type(placed.element).__module__.startswith(OWN):
             yield asked_element(f"elements.{placed.element.name}", compiled, placed)
 
 
-def asked_force(where: str, compiled: CompiledSystem, u: int, i: int, callback: Callback) -> AskedLaw:
-    """Return the function of user force u, which is element i among couplers and user forces."""
-    n_out = int(compiled.model.users.n_forces[u] + compiled.model.users.n_states[u])
-    unknowns = unknowns_of_force(compiled, u, i)
+def asked_force(where: str, compiled: CompiledSystem, i: int, callback: Callback) -> AskedLaw:
+    """Return the function of the user force that is element i among couplers and user forces."""
+    elements = compiled.model.elements
+    n_out = int(elements.n_forces[i] + elements.n_states[i])
+    unknowns = unknowns_of_force(compiled, i)
     function = FORCE(callback.address)
 
     def ask(inputs: Array, t: Array) -> Array:

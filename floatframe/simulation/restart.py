@@ -57,7 +57,7 @@ def system_digest(system: System, integrator: Integrator) -> str:
     for each in compiled.laws:
         digest.update(repr(each.digest).encode())
     arrays = dict(leaves(compiled.model)) | {name: getattr(compiled.placed, name) for name in STATE}
-    for name in ("users.address", "laws.address", "laws.tangent"):  # addresses change from process to process
+    for name in ("elements.address", "laws.address", "laws.tangent"):  # addresses change from process to process
         del arrays[name]
     for part in arrays.values():
         array = np.ascontiguousarray(part)

@@ -45,7 +45,7 @@ def switch_events(system: System) -> tuple[SwitchEvent, ...]:
     found = []
     forces = [force for force in system.forces if isinstance(force, UserForce)]
     for u, force in enumerate(forces):
-        unknowns = unknowns_of_force(compiled, u, len(system.couplers) + u)
+        unknowns = unknowns_of_force(compiled, len(system.couplers) + u)
         numbers = {name: k for k, name in enumerate(force.functions)}
         for key, text in force.switches.items():
             where = f"force {force.name!r}: switches: {key}"
@@ -74,11 +74,11 @@ def column_at(column: Array, t: Array) -> Array:
     return column
 
 
-def unknowns_of_force(compiled: CompiledSystem, u: int, i: int) -> IntArray:
-    """Return the indices of the unknowns (values, rates, states) of user force u, which is element i."""
-    users, elements = compiled.model.users, compiled.model.elements
+def unknowns_of_force(compiled: CompiledSystem, i: int) -> IntArray:
+    """Return the indices of the unknowns (values, rates, states) of the user force that is element i."""
+    elements = compiled.model.elements
     rows = compiled.model.coordinates.row[elements.coordinate0[i] : elements.coordinate0[i + 1]]
-    states = int(elements.core[i]) + int(users.n_forces[u]) + 3 * np.arange(int(users.n_states[u]))
+    states = int(elements.core[i]) + int(elements.n_forces[i]) + 3 * np.arange(int(elements.n_states[i]))
     return np.concatenate([rows, rows + 1, states])
 
 

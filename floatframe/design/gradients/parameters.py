@@ -405,7 +405,7 @@ def has_same_topology(compiled: CompiledSystem, other: CompiledSystem) -> bool:
         (own.bodies.n_q, its.bodies.n_q), (own.connections.size, its.connections.size),
         (own.connections.law, its.connections.law), (own.markers.body, its.markers.body),
         (own.rows.kind, its.rows.kind), (own.rows.part, its.rows.part), (own.loads.marker, its.loads.marker),
-        (own.joint_forces.table, its.joint_forces.table), (own.users.n_states, its.users.n_states),
+        (own.joint_forces.table, its.joint_forces.table), (own.elements.n_states, its.elements.n_states),
     ]  # fmt: skip
     names = (compiled.body_names, compiled.connection_names) == (other.body_names, other.connection_names)
     return names and all(np.array_equal(a, b) for a, b in pairs)

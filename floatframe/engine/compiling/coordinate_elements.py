@@ -82,9 +82,8 @@ class CoordinateElements:
 
     names: tuple[str, ...] = ()
     coordinate0: list[int] = field(default_factory=lambda: [0])
-    core: list[int] = field(default_factory=list)
     coordinates: list[dict[str, float]] = field(default_factory=list)
-    users: list[dict[str, int]] = field(default_factory=list)
+    items: list[dict[str, int]] = field(default_factory=list)
     state0: list[int] = field(default_factory=lambda: [0])
     states: list[dict[str, float]] = field(default_factory=list)
     tapes: list[Tape] = field(default_factory=list)
@@ -109,9 +108,8 @@ class CoordinateElements:
         """Return these data as arrays of the model."""
         tapes = self.tapes
         return {
-            "elements": filled(model.Elements(), coordinate0=self.coordinate0, core=self.core),
+            "elements": of_items(model.Elements(), self.items, coordinate0=self.coordinate0, state0=self.state0),
             "coordinates": of_items(model.Coordinates(), self.coordinates),
-            "users": of_items(model.Users(), self.users, state0=self.state0),
             "states": of_items(model.States(), self.states),
             "tapes": filled(
                 model.Tapes(),
@@ -164,15 +162,12 @@ def add_user_force(
         record["core"] = first + acting.index(name) if name in acting else first
     starts = enumerate(force.states.values())
     elements.states += [{"row": first + len(acting) + 3 * k, "start": start, "size": LEAST_SIZE} for k, start in starts]
-    elements.state0.append(len(elements.states))
-    address = 0
+    elements.state0[-1] = len(elements.states)
+    item = elements.items[-1]
+    item["n_forces"], item["n_states"] = len(acting), len(force.states)
     if force.function is not None:
         elements.callbacks.append(callback_of(force, len(coordinates)))
-        address = elements.callbacks[-1].address
-    elements.users.append(
-        {"n_forces": len(acting), "n_states": len(force.states), "address": address, "tape0": len(elements.tapes)}
-    )
-    if force.function is not None:
+        item["address"] = elements.callbacks[-1].address
         return
     assert isinstance(force.forces, Mapping)  # checked by the force
     numbers = {name: functions.index(function) for name, function in force.functions.items()}
@@ -222,6 +217,7 @@ def add_coordinates(
         else:
             ends += [End(placed.a, 1.0, force, arm), End(placed.b, -1.0, force)]
     marker, w0 = made.add(name, law, ends, [*rows, *core], has_rates=True)
+    made.item[-1] = len(elements.items)  # couplers and user forces are in one table
     elements.placed += coordinates
     elements.lengths += [length] * len(coordinates)
     for k, (value, force, arm) in enumerate(starts):
@@ -237,7 +233,10 @@ def add_coordinates(
             }
         )
     elements.coordinate0.append(len(elements.coordinates))
-    elements.core.append(w0 + len(rows))
+    elements.state0.append(len(elements.states))
+    elements.items.append(
+        {"core": w0 + len(rows), "n_forces": 0, "n_states": 0, "address": 0, "tape0": len(elements.tapes)}
+    )
     return w0 + len(rows)
 
 

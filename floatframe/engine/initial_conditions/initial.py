@@ -37,7 +37,7 @@ from floatframe.engine.initial_conditions.newton_equations import (
     with_modal_weight,
 )
 from floatframe.engine.initial_conditions.placement import require_placed_near
-from floatframe.engine.kernels.model import JOINT, Model
+from floatframe.engine.kernels.model import JOINT, USER_FORCE, Model
 from floatframe.engine.kernels.work import Work, new_work
 from floatframe.engine.tree.kernels.tree import Tree
 from floatframe.engine.tree.topology import tree_of
@@ -458,7 +458,7 @@ def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState, t:
             s *= 0.5
             if s < NEAREST * h:
                 return np.zeros_like(u_dot)
-    if len(model.functions.begin) or compiled.laws or len(model.users.n_forces):
+    if len(model.functions.begin) or compiled.laws or (model.connections.law == USER_FORCE).any():
         return (-3 * u_dot_after(0.0) + 4 * u_dot_after(s) - u_dot_after(2 * s)) / (2 * s)
     return (u_dot_after(s) - u_dot_after(-s)) / (2 * s)
 

@@ -53,7 +53,6 @@ __all__ = [
     "States",
     "Stations",
     "Tapes",
-    "Users",
 ]
 
 JOINT, SPRING, BUSHING, CONTACT, COUPLER, USER_FORCE, ELEMENT = range(7)  #: values of `Connections.law`
@@ -63,7 +62,7 @@ N_BLOCKS = 10
 n_b, n_t, n_m, n_c, n_w, n_ends, n_pairs = (Size(name) for name in ("n_b", "n_t", "n_m", "n_c", "n_w", "ends", "pairs"))
 n_functions, n_pieces, n_springs, n_bushings = (Size(name) for name in ("functions", "pieces", "springs", "bushings"))
 n_contacts, n_forces, n_elements, n_x = (Size(name) for name in ("contacts", "joint forces", "elements", "coordinates"))
-n_lines, n_stations, n_users, n_states = (Size(name) for name in ("lines", "stations", "user forces", "states"))
+n_lines, n_stations, n_states = (Size(name) for name in ("lines", "stations", "states"))
 n_tapes, n_operations, n_loads, n_body_loads = (Size(name) for name in ("tapes", "operations", "loads", "body loads"))
 n_angles, n_laws, n_gaps, n_q, n_u = (Size(name) for name in ("angles", "laws", "gaps", "n_q", "n_u"))
 
@@ -227,6 +226,12 @@ class Elements(NamedTuple):
 
     coordinate0: IntArray = integer(n_elements + 1)
     core: IntArray = integer(n_elements)  #: row of the multiplier of a coupler, or of the first force of a user force
+    n_forces: IntArray = integer(n_elements)  #: forces of a user force, 0 for a coupler
+    n_states: IntArray = integer(n_elements)
+    address: IntArray = integer(n_elements)  #: address of the user's C function, 0 if the force is made of expressions
+    #: index of the first expression of a user force: forces come first, then rates of the states
+    tape0: IntArray = integer(n_elements)
+    state0: IntArray = integer(n_elements + 1)  #: index of the first state
 
 
 class Coordinates(NamedTuple):
@@ -260,17 +265,6 @@ class Stations(NamedTuple):
 
     s: Array = real(n_stations, unit="m")  #: coordinate of the station along the line
     marker: IntArray = integer(n_stations)
-
-
-class Users(NamedTuple):
-    """User forces."""
-
-    n_forces: IntArray = integer(n_users)
-    n_states: IntArray = integer(n_users)
-    address: IntArray = integer(n_users)  #: address of the user's C function, 0 if the force is made of expressions
-    #: index of the first expression: forces come first, then rates of the states
-    tape0: IntArray = integer(n_users)
-    state0: IntArray = integer(n_users + 1)  #: index of the first state
 
 
 class Laws(NamedTuple):
@@ -387,7 +381,6 @@ class Model(NamedTuple):
     coordinates: Coordinates = Coordinates()
     lines: Lines = Lines()
     stations: Stations = Stations()
-    users: Users = Users()
     laws: Laws = Laws()
     states: States = States()
     tapes: Tapes = Tapes()

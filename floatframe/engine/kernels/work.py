@@ -338,10 +338,10 @@ class Work(NamedTuple):
 
 def sizes_of(model: Model) -> dict[str, int]:
     """Return the sizes of all arrays of a system by name; `ValueError` if those of the model are inconsistent."""
-    bodies, markers, users = model.bodies, model.markers, model.users
+    bodies, markers, elements = model.bodies, model.markers, model.elements
     is_end = (markers.connection >= 0) & (markers.body >= 0)
-    n_coordinates = np.diff(model.elements.coordinate0)[len(model.elements.core) - len(users.n_states) :]
-    n_in, n_out = 1 + 2 * n_coordinates + users.n_states, users.n_forces + users.n_states
+    n_out = elements.n_forces + elements.n_states
+    n_in = 1 + 2 * np.diff(elements.coordinate0) + elements.n_states
     return (
         cast(Tabled, model).sizes
         | state_sizes(model)

@@ -12,7 +12,7 @@ from fe_models.foundation.arrays import Array, IntArray
 from floatframe.engine.initial_conditions.initial import has_normal_friction
 from floatframe.engine.initial_conditions.newton_equations import modal_matrix, modal_weight
 from floatframe.engine.kernels.connections.contact import V_0
-from floatframe.engine.kernels.model import CONTACT, STIFFNESS, Model
+from floatframe.engine.kernels.model import CONTACT, STIFFNESS, USER_FORCE, Model
 from floatframe.engine.kernels.records import filled, measured, zeros
 from floatframe.engine.kernels.work import Work, sizes_of
 from floatframe.engine.structure_preserving.bodies import CentralBody
@@ -167,13 +167,13 @@ def does_work(model: Model) -> bool:
     springs = model.springs
     counts = (
         model.loads.marker, model.body_loads.body, model.joint_forces.motor, model.contacts.stiffness,
-        model.users.n_forces, model.laws.length,
+        model.laws.length,
     )  # fmt: skip
     return (
         any(len(each) for each in counts)
         or bool(springs.damping.any() or (springs.table >= 0).any())
         or bool(model.bushings.damping.any() or (model.bushings.table >= 0).any())
-        or bool((model.rows.motion >= 0).any())
+        or bool((model.connections.law == USER_FORCE).any() or (model.rows.motion >= 0).any())
     )
 
 

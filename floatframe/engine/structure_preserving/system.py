@@ -12,7 +12,7 @@ from floatframe.errors import ModelError
 from floatframe.model.joints.rows import is_held_velocity, kind_of
 from floatframe.model.system import System
 
-__all__ = ["Connection", "DiscreteSystem", "discrete_system", "element_states", "multiplier_rows"]
+__all__ = ["Connection", "DiscreteSystem", "discrete_system", "multiplier_rows", "state_rows"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +78,7 @@ def discrete_system(system: System, scheme: str) -> DiscreteSystem:
         held = tuple(k for k in rows if kind_of(model.rows.kind[k]).holds)
         if law == ELEMENT:
             held = multiplier_rows(model, c)
-        states = state_rows(model, c) if law == USER_FORCE else element_states(model, c) if law == ELEMENT else ()
+        states = state_rows(model, c)
         markers = tuple(markers_of(model, c))
         joined = tuple(sorted({int(model.markers.body[m]) for m in markers} - {-1}))
         connections.append(Connection(c, markers, joined, held, n_held, states, n_states))
@@ -100,8 +100,7 @@ def markers_of(model: Model, c: int) -> list[int]:
         return list(range(first, first + int(model.laws.head[item, 0])))
     if law not in (COUPLER, USER_FORCE):
         return [int(model.connections.a[c]), int(model.connections.b[c])]
-    own = coordinates_of(model, item if law == COUPLER else element_of(model, c))
-    return [int(m) for p in own for m in (model.coordinates.a[p], model.coordinates.b[p])]
+    return [int(m) for p in coordinates_of(model, item) for m in (model.coordinates.a[p], model.coordinates.b[p])]
 
 
 def coordinates_of(model: Model, element: int) -> range:
@@ -109,21 +108,10 @@ def coordinates_of(model: Model, element: int) -> range:
     return range(int(model.elements.coordinate0[element]), int(model.elements.coordinate0[element + 1]))
 
 
-def element_of(model: Model, c: int) -> int:
-    """Return the index of user force c among all elements, in which couplers come first."""
-    return int(model.connections.item[c]) + len(model.elements.core) - len(model.users.n_states)
-
-
 def state_rows(model: Model, c: int) -> tuple[int, ...]:
-    """Return the rows of the states of user force c."""
-    u = int(model.connections.item[c])
-    return tuple(int(k) for k in model.states.row[model.users.state0[u] : model.users.state0[u + 1]])
-
-
-def element_states(model: Model, c: int) -> tuple[int, ...]:
-    """Return the rows of the states of element c."""
-    i = int(model.connections.item[c])
-    return tuple(int(k) for k in model.states.row[model.laws.state0[i] : model.laws.state0[i + 1]])
+    """Return the rows of the states of connection c."""
+    rows, w0 = model.states.row, model.connections.w0
+    return tuple(int(k) for k in rows[(w0[c] <= rows) & (rows < w0[c + 1])])
 
 
 def multiplier_rows(model: Model, c: int) -> tuple[int, ...]:

@@ -32,16 +32,23 @@ from floatframe.engine.kernels.vector import add, cross, dot, norm, put, put_sum
 from floatframe.model.joints.rows.kinds import PUSH, SPAN, TWIST_B
 
 __all__ = [
-    "clear_derivatives",
-    "coordinate_derivatives",
     "coordinate_gradient",
     "coordinate_motion",
-    "coordinate_rows",
     "coordinate_second_rate",
     "coordinate_tangent_rate",
+    "derivatives_along_coordinates",
     "ends_and_row",
+    "indices_of",
     "predict_coordinate",
+    "rows_along_coordinates",
 ]
+
+
+@small
+def indices_of(model, c):
+    """Return the index of connection c among couplers and user forces, and the range of its coordinates."""
+    i = model.connections.item[c]
+    return i, model.elements.coordinate0[i], model.elements.coordinate0[i + 1]
 
 
 @small
@@ -96,8 +103,22 @@ def predict_coordinate(coordinates, state, p, h):
 
 
 @inner
-def coordinate_rows(model, work, p, Q, c_k):
-    """Write the rows of coordinate p with force Q, and the wrench that Q applies to both markers."""
+def rows_along_coordinates(model, work, c, c_k):
+    """Write the rows of the coordinates of connection c, and the wrenches of its forces."""
+    _, first, last = indices_of(model, c)
+    for p in range(first, last):
+        coordinate_rows(model, work, p, c_k)
+
+
+@small
+def force_along(model, work, p):
+    """Return the force along coordinate p."""
+    return model.coordinates.factor[p] * work.state.w[model.coordinates.core[p]]
+
+
+@inner
+def coordinate_rows(model, work, p, c_k):
+    """Write the rows of coordinate p, and the wrench that its force applies to both markers."""
     a, b, k = ends_and_row(model, p)
     g, w, wrench = work.connections.g, work.state.w, work.markers.wrench
     x, v = coordinate_motion(model, work, p)
@@ -107,7 +128,7 @@ def coordinate_rows(model, work, p, Q, c_k):
     if f < 0:
         return
     F = vector(w[f:])
-    put(g, f, scaled(c_k, add(F, scaled(Q, force_direction(model, work, p)))))
+    put(g, f, scaled(c_k, add(F, scaled(force_along(model, work, p), force_direction(model, work, p)))))
     first = 0 if model.markers.force[a] >= 0 else 3
     put_sum(wrench[a], first, F)
     put_sum(wrench[b], first, scaled(-1.0, F))
@@ -133,21 +154,24 @@ def coordinate_gradient(model, work, p, r, by_x, by_v):
 
 
 @inner
-def clear_derivatives(model, work, c, i):
-    """Set V of connection c and P at the markers of all coordinates of element i to zero."""
+def derivatives_along_coordinates(model, work, c, c_k):
+    """Write P and V for the rows of the coordinates of connection c, and set those of its other rows to zero."""
     size, V = model.connections.size[c], work.connections.V[c]
+    _, first, last = indices_of(model, c)
     for r in range(size):
         for j in range(size):
             V[r, j] = 0.0
-        for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
+        for p in range(first, last):
             for j in range(12):
                 work.connections.P[model.coordinates.a[p], r, j] = 0.0
                 work.connections.P[model.coordinates.b[p], r, j] = 0.0
+    for p in range(first, last):
+        coordinate_derivatives(model, work, c, p, c_k)
 
 
 @inner
-def coordinate_derivatives(model, work, c, p, Q, column, by_unknown, c_k):
-    """Write P and V for the rows of coordinate p of connection c, with force Q = by_unknown w[column]."""
+def coordinate_derivatives(model, work, c, p, c_k):
+    """Write P and V for the rows of coordinate p of connection c."""
     a, b, k = ends_and_row(model, p)
     w0 = model.connections.w0[c]
     V = work.connections.V[c]
@@ -158,6 +182,7 @@ def coordinate_derivatives(model, work, c, p, Q, column, by_unknown, c_k):
     f, m = model.coordinates.force[p], model.coordinates.arm[p]
     if f < 0:
         return
+    Q, column, by_unknown = force_along(model, work, p), model.coordinates.core[p], model.coordinates.factor[p]
     e, d, kind = force_direction(model, work, p), distance(work.markers, a, b), model.rows.kind[k]
     for i in range(3):  # row of F + Q e for an axis of the ground
         axis, r = unit(i), f - w0 + i

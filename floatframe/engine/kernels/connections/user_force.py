@@ -14,11 +14,11 @@ import math
 from floatframe.engine.kernels.compiler.compilation import inner, view
 from floatframe.engine.kernels.compiler.user_call import call_user_function
 from floatframe.engine.kernels.connections.coordinate import (
-    clear_derivatives,
-    coordinate_derivatives,
     coordinate_gradient,
     coordinate_motion,
-    coordinate_rows,
+    derivatives_along_coordinates,
+    indices_of,
+    rows_along_coordinates,
 )
 from floatframe.engine.kernels.dense import slice_of
 from floatframe.engine.kernels.time_function import time_function
@@ -53,7 +53,6 @@ from floatframe.model.functions.expressions import (
 
 __all__ = [
     "begin_states",
-    "element_of",
     "input_parts",
     "note_no_number",
     "put_state_derivatives",
@@ -211,17 +210,11 @@ ROUNDING = 2e-15  # fraction of a number below which a step is lost in roundoff
 
 
 @inner
-def element_of(model, c):
-    """Return the index of user force c among all elements, in which couplers come first."""
-    return model.connections.item[c] + model.elements.coordinate0.shape[0] - 1 - model.users.n_states.shape[0]
-
-
-@inner
 def counts_of(model, c):
     """Return the numbers of coordinates, inputs and outputs of user force c."""
-    i, u = element_of(model, c), model.connections.item[c]
-    n, n_states = model.elements.coordinate0[i + 1] - model.elements.coordinate0[i], model.users.n_states[u]
-    return n, 1 + 2 * n + n_states, model.users.n_forces[u] + n_states
+    i, first, last = indices_of(model, c)
+    n, n_states = last - first, model.elements.n_states[i]
+    return n, 1 + 2 * n + n_states, model.elements.n_forces[i] + n_states
 
 
 @view
@@ -233,14 +226,13 @@ def input_parts(inputs, n):
 @inner
 def user_values(model, work, c):
     """Write t, x, v, z into work.users.inputs, and forces and rates of states into work.users.outputs."""
-    i, u = element_of(model, c), model.connections.item[c]
-    first, last = model.elements.coordinate0[i], model.elements.coordinate0[i + 1]
+    i, first, last = indices_of(model, c)
     work.users.inputs[0] = work.state.time
     x, v, z = input_parts(work.users.inputs, last - first)
     for p in range(first, last):
         x[p - first], v[p - first] = coordinate_motion(model, work, p)
-    row = model.elements.core[i] + model.users.n_forces[u]
-    for s in range(model.users.n_states[u]):
+    row = model.elements.core[i] + model.elements.n_forces[i]
+    for s in range(model.elements.n_states[i]):
         z[s] = work.state.w[row + 3 * s]
     user_outputs(model, work, c)
 
@@ -248,13 +240,13 @@ def user_values(model, work, c):
 @inner
 def user_outputs(model, work, c):
     """Write forces and rates of states for the inputs into work.users.outputs."""
-    u = model.connections.item[c]
+    i = model.connections.item[c]
     _, n_in, n_out = counts_of(model, c)
-    if model.users.address[u] != 0:
-        call_user_function(model.users.address[u], work.users.inputs, work.users.outputs)
+    if model.elements.address[i] != 0:
+        call_user_function(model.elements.address[i], work.users.inputs, work.users.outputs)
     else:
         for j in range(n_out):
-            f = model.users.tape0[u] + j
+            f = model.elements.tape0[i] + j
             work.users.outputs[j] = tape_value(model.tapes, model.functions, f, work.users.inputs, work.tapes)
     note_no_number(work, c, work.users.outputs, n_out, work.users.inputs, n_in)
 
@@ -278,15 +270,14 @@ def are_finite(values, n):
 @inner
 def user_gradients(model, work, c):
     """Write the derivatives of all outputs by all inputs, row by row."""
-    u = model.connections.item[c]
+    i, first, _ = indices_of(model, c)
     n, n_in, n_out = counts_of(model, c)
     user_values(model, work, c)
-    if model.users.address[u] == 0:
+    if model.elements.address[i] == 0:
         for j in range(n_out):
-            f, gradient = model.users.tape0[u] + j, slice_of(work.users.gradients, n_in, j, 1)
+            f, gradient = model.elements.tape0[i] + j, slice_of(work.users.gradients, n_in, j, 1)
             tape_gradient(model.tapes, model.functions, f, work.users.inputs, work.tapes, gradient)
         return
-    first = model.elements.coordinate0[element_of(model, c)]
     for k in range(1, n_in):  # derivatives by time are not used
         here = work.users.inputs[k]
         if k <= n:
@@ -298,11 +289,11 @@ def user_gradients(model, work, c):
         step = max(step, ROUNDING * abs(here))
         above, below = here + step, here - step
         work.users.inputs[k] = above
-        call_user_function(model.users.address[u], work.users.inputs, work.users.trial)
+        call_user_function(model.elements.address[i], work.users.inputs, work.users.trial)
         work.users.inputs[k] = below
         for j in range(n_out):
             work.users.gradients[j * n_in + k] = work.users.trial[j]
-        call_user_function(model.users.address[u], work.users.inputs, work.users.trial)
+        call_user_function(model.elements.address[i], work.users.inputs, work.users.trial)
         work.users.inputs[k] = here
         for j in range(n_out):
             change = work.users.gradients[j * n_in + k] - work.users.trial[j]
@@ -312,16 +303,16 @@ def user_gradients(model, work, c):
 @inner
 def user_force_rows(model, work, c, c_k):
     """Write the residual of user force c, and its wrenches."""
-    i, u = element_of(model, c), model.connections.item[c]
-    for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
-        coordinate_rows(model, work, p, work.state.w[model.coordinates.core[p]], c_k)
+    i = model.connections.item[c]
+    rows_along_coordinates(model, work, c, c_k)
     user_values(model, work, c)
     k = model.elements.core[i]
-    for j in range(model.users.n_forces[u]):
+    for j in range(model.elements.n_forces[i]):
         work.connections.g[k + j] = c_k * (work.state.w[k + j] - work.users.outputs[j])
-    k += model.users.n_forces[u]
-    for s in range(model.users.n_states[u]):
-        state_rows(work, model.users.state0[u] + s, k + 3 * s, work.users.outputs[model.users.n_forces[u] + s], c_k)
+    n_forces = model.elements.n_forces[i]
+    for s in range(model.elements.n_states[i]):
+        output = work.users.outputs[n_forces + s]
+        state_rows(work, model.elements.state0[i] + s, k + n_forces + 3 * s, output, c_k)
 
 
 @inner
@@ -344,18 +335,15 @@ def put_state_derivatives(work, V, s, r):
 @inner
 def user_force_derivatives(model, work, c, c_k):
     """Write the derivatives of user force c: P by the motion of its markers, V by its own wrench."""
-    i, u, V = element_of(model, c), model.connections.item[c], work.connections.V[c]
-    first, last = model.elements.coordinate0[i], model.elements.coordinate0[i + 1]
-    clear_derivatives(model, work, c, i)
-    for p in range(first, last):
-        k = model.coordinates.core[p]
-        coordinate_derivatives(model, work, c, p, work.state.w[k], k, 1.0, c_k)
+    i, first, last = indices_of(model, c)
+    V = work.connections.V[c]
+    derivatives_along_coordinates(model, work, c, c_k)
     user_gradients(model, work, c)
     n, n_in, n_out = counts_of(model, c)
-    n_forces, n_states = model.users.n_forces[u], model.users.n_states[u]
+    n_forces, n_states = model.elements.n_forces[i], model.elements.n_states[i]
     core = model.elements.core[i] - model.connections.w0[c]
     for s in range(n_states):
-        put_state_derivatives(work, V, model.users.state0[u] + s, core + n_forces + 3 * s)
+        put_state_derivatives(work, V, model.elements.state0[i] + s, core + n_forces + 3 * s)
     for j in range(n_out):
         r = core + j if j < n_forces else core + n_forces + 3 * (j - n_forces) + 1
         V[r, r] = 1.0
@@ -369,9 +357,9 @@ def user_force_derivatives(model, work, c, c_k):
 @inner
 def user_force_power(model, work, c):
     """Return the power that user force c supplies to the bodies."""
-    i = element_of(model, c)
+    _, first, last = indices_of(model, c)
     total = 0.0
-    for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
+    for p in range(first, last):
         if model.coordinates.force[p] >= 0:
             _, v = coordinate_motion(model, work, p)
             total += work.state.w[model.coordinates.core[p]] * v

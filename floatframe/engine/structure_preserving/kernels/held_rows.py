@@ -3,7 +3,7 @@
 import math
 
 from floatframe.engine.kernels.compiler.compilation import inner
-from floatframe.engine.kernels.connections.coordinate import ends_and_row
+from floatframe.engine.kernels.connections.coordinate import ends_and_row, indices_of
 from floatframe.engine.kernels.vector import add, cross, dot, norm, scaled, sub, vector
 from floatframe.engine.structure_preserving.kernels import deformed_lines, rows
 from floatframe.engine.structure_preserving.kernels.coordinates import (
@@ -85,11 +85,11 @@ def row_rate(model, step, c, k, t):
 @inner
 def coupler_value(model, step, c):
     """Return the value of coupler c's row at the end of the step."""
-    i = model.connections.item[c]
+    i, first, last = indices_of(model, c)
     k = model.elements.core[i]
     constant, _ = held(model, k, step.end.state.time)
     total = -constant
-    for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
+    for p in range(first, last):
         a, b, row = ends_and_row(model, p)
         _, end = ends_of_step(model, step, row, a, b)
         total += model.coordinates.factor[p] * end
@@ -99,9 +99,9 @@ def coupler_value(model, step, c):
 @inner
 def add_coupler_reaction(model, discrete, step, c, f):
     """Add the loads of coupler c with multiplier f, whose work is f times the change of its row."""
-    i = model.connections.item[c]
+    i, first, last = indices_of(model, c)
     scale = model.rows.x[model.elements.core[i], 0]
-    for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
+    for p in range(first, last):
         a, b, row = ends_and_row(model, p)
         add_coordinate_force(model, discrete, step, row, a, b, scale * model.coordinates.factor[p] * f)
 
@@ -109,8 +109,9 @@ def add_coupler_reaction(model, discrete, step, c, f):
 @inner
 def coupler_change(model, discrete, step, c):
     """Return the change of coupler c's row over the step due to motion alone."""
-    i, total = model.connections.item[c], 0.0
-    for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
+    i, first, last = indices_of(model, c)
+    total = 0.0
+    for p in range(first, last):
         a, b, row = ends_and_row(model, p)
         total += model.coordinates.factor[p] * coordinate_change(model, discrete, step, row, a, b)
     return model.rows.x[model.elements.core[i], 0] * total

@@ -219,9 +219,9 @@ def write_state_residual(model, work, discrete, step, c):
     if not step.is_closing:
         user_state_residual(model, work, discrete, step, c)
         return
-    u = model.connections.item[c]
+    i = model.connections.item[c]
     first = step.load.shape[0] + step.f.shape[0]
-    for s in range(first + model.users.state0[u], first + model.users.state0[u + 1]):
+    for s in range(first + model.elements.state0[i], first + model.elements.state0[i + 1]):
         step.residual[s] = step.z[s]
 
 

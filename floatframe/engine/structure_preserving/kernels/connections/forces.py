@@ -2,8 +2,8 @@
 
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.bushing import continued, law, rotation_vector
-from floatframe.engine.kernels.connections.coordinate import ends_and_row
-from floatframe.engine.kernels.connections.user_force import element_of, input_parts, user_outputs
+from floatframe.engine.kernels.connections.coordinate import ends_and_row, indices_of
+from floatframe.engine.kernels.connections.user_force import input_parts, user_outputs
 from floatframe.engine.kernels.rotation import exp_matrix
 from floatframe.engine.kernels.time_function import time_function
 from floatframe.engine.kernels.vector import (
@@ -143,18 +143,17 @@ def bushing_load(model, discrete, step, c):
 @inner
 def put_states(model, step, c, z, part):
     """Write the states of user force c at the fraction `part` of the step into z."""
-    u = model.connections.item[c]
-    change0 = step.load.shape[0] + step.f.shape[0] + model.users.state0[u]
-    for s in range(model.users.n_states[u]):
-        k = model.states.row[model.users.state0[u] + s]
+    i = model.connections.item[c]
+    change0 = step.load.shape[0] + step.f.shape[0] + model.elements.state0[i]
+    for s in range(model.elements.n_states[i]):
+        k = model.states.row[model.elements.state0[i] + s]
         z[s] = step.known[k] + part * step.z[change0 + s]
 
 
 @inner
 def user_force_load(model, work, discrete, step, c):
     """Add the loads of user force c, and return the supplied work."""
-    i = element_of(model, c)
-    first, last = model.elements.coordinate0[i], model.elements.coordinate0[i + 1]
+    i, first, last = indices_of(model, c)
     work.users.inputs[0] = step.t_force
     x, v, z = input_parts(work.users.inputs, last - first)
     for p in range(first, last):
@@ -178,8 +177,7 @@ def user_force_load(model, work, discrete, step, c):
 @inner
 def user_state_residual(model, work, discrete, step, c):
     """Write the residuals dz - h g of the states of user force c, with g in the middle of the step."""
-    i, u = element_of(model, c), model.connections.item[c]
-    first, last = model.elements.coordinate0[i], model.elements.coordinate0[i + 1]
+    i, first, last = indices_of(model, c)
     x, v, z = input_parts(work.users.inputs, last - first)
     work.users.inputs[0] = 0.5 * (step.t_0 + step.end.state.time)
     for p in range(first, last):
@@ -192,7 +190,7 @@ def user_state_residual(model, work, discrete, step, c):
         v[p - first] = rate
     put_states(model, step, c, z, 0.5)
     user_outputs(model, work, c)
-    change0 = step.load.shape[0] + step.f.shape[0] + model.users.state0[u]
-    for s in range(model.users.n_states[u]):
-        rate = work.users.outputs[model.users.n_forces[u] + s]
+    change0 = step.load.shape[0] + step.f.shape[0] + model.elements.state0[i]
+    for s in range(model.elements.n_states[i]):
+        rate = work.users.outputs[model.elements.n_forces[i] + s]
         step.residual[change0 + s] = step.z[change0 + s] - step.h * rate

@@ -13,7 +13,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.callbacks.user_forces import C_FUNCTION
 from floatframe.engine.kernels.model import Model
-from floatframe.engine.structure_preserving.system import coordinates_of, element_of, state_rows
+from floatframe.engine.structure_preserving.system import coordinates_of, state_rows
 from floatframe.model.functions import expressions as ex
 from floatframe.model.joints.rows import kind_of
 from floatframe.model.rotations import continued_rotation, cross, dot, rotated, rotation_exp, tilde
@@ -69,37 +69,36 @@ def tape_at(model: Model, f: int, inputs: Array) -> float:
     return results[-1]
 
 
-def values_at(model: Model, u: int, inputs: Array) -> Array:
-    """Return forces and rates of states of user force u at inputs, (n_in,)."""
-    n_out = int(model.users.n_forces[u] + model.users.n_states[u])
-    if model.users.address[u] == 0:
-        return np.array([tape_at(model, int(model.users.tape0[u]) + j, inputs) for j in range(n_out)])
+def values_at(model: Model, i: int, inputs: Array) -> Array:
+    """Return forces and rates of states of user force i at inputs, (n_in,)."""
+    n_out = int(model.elements.n_forces[i] + model.elements.n_states[i])
+    if model.elements.address[i] == 0:
+        return np.array([tape_at(model, int(model.elements.tape0[i]) + j, inputs) for j in range(n_out)])
     x, y = np.ascontiguousarray(inputs, float), np.zeros(n_out)
     number = ctypes.POINTER(ctypes.c_double)
-    C_FUNCTION(int(model.users.address[u]))(x.ctypes.data_as(number), y.ctypes.data_as(number))
+    C_FUNCTION(int(model.elements.address[i]))(x.ctypes.data_as(number), y.ctypes.data_as(number))
     return y
 
 
-def user_values(model: Model, u: int, inputs: Array) -> Array:
+def user_values(model: Model, i: int, inputs: Array) -> Array:
     """Return forces and rates of states, (..., n_out), with their derivatives along imaginary parts."""
-    flat, sizes = inputs.reshape(-1, inputs.shape[-1]), sizes_of_inputs(model, u)
+    flat, sizes = inputs.reshape(-1, inputs.shape[-1]), sizes_of_inputs(model, i)
     out = []
     for x in flat:
-        value = values_at(model, u, np.real(x))
+        value = values_at(model, i, np.real(x))
         size = np.abs(np.imag(x) / sizes).max(initial=0.0)
         if size > 0:
             way = STEP * np.imag(x) / size
-            change = values_at(model, u, np.real(x) + way) - values_at(model, u, np.real(x) - way)
+            change = values_at(model, i, np.real(x) + way) - values_at(model, i, np.real(x) - way)
             value = value + 1j * change * (0.5 * size / STEP)
         out.append(value)
     return np.array(out).reshape(*inputs.shape[:-1], -1)
 
 
-def sizes_of_inputs(model: Model, u: int) -> Array:
-    """Return sizes of t, x, v, z of user force u, (n_in,), for differences; derivatives by t are not used."""
-    i = u + len(model.elements.core) - len(model.users.n_states)
+def sizes_of_inputs(model: Model, i: int) -> Array:
+    """Return sizes of t, x, v, z of user force i, (n_in,), for differences; derivatives by t are not used."""
     x = slice(int(model.elements.coordinate0[i]), int(model.elements.coordinate0[i + 1]))
-    z = model.states.size[model.users.state0[u] : model.users.state0[u + 1]]
+    z = model.states.size[model.elements.state0[i] : model.elements.state0[i + 1]]
     return np.concatenate([[1.0], model.coordinates.size[x], model.coordinates.speed[x], z])
 
 
@@ -111,7 +110,7 @@ def inputs_of(
     With x at the end of the force interval, or its mean.
     """
     x, v, changes = [], [], []
-    for p, pair in zip(coordinates_of(model, element_of(model, c)), pairs, strict=True):
+    for p, pair in zip(coordinates_of(model, int(model.connections.item[c])), pairs, strict=True):
         k = int(model.coordinates.row[p])
         rate = coordinate_rate(model, k, pair, span.h)
         begin, end = coordinate_ends(model, k, pair)
@@ -129,9 +128,9 @@ def user_force_load(
     """Add the loads of user force c, and return their work. dz: changes of the states, (..., n_states)."""
     z = span.w[list(state_rows(model, c))] + (0.5 * dz if is_middle else 0.0 * dz)
     inputs, changes = inputs_of(model, c, pairs, span.t_force, span, z, is_middle=is_middle)
-    values = user_values(model, int(model.connections.item[c]), inputs)
+    i = int(model.connections.item[c])
+    values = user_values(model, i, inputs)
     given = np.zeros(values.shape[:-1], values.dtype)
-    i = element_of(model, c)
     for p, pair, load, change in zip(coordinates_of(model, i), pairs, loads, changes, strict=True):
         if model.coordinates.force[p] >= 0:
             Q = values[..., int(model.coordinates.core[p] - model.elements.core[i])]
@@ -142,14 +141,14 @@ def user_force_load(
 
 def user_state_rates(model: Model, c: int, pairs: list[Pair], span: Span, dz: Array, *, is_along: bool) -> Array:
     """Return the rates of the states of user force c in the middle of the step, (..., n_states)."""
+    i = int(model.connections.item[c])
     z = span.w[list(state_rows(model, c))] + 0.5 * dz
     inputs, _ = inputs_of(model, c, pairs, 0.5 * (span.t_0 + span.t_1), span, z, is_middle=True)
     if not is_along:
         for p, pair in enumerate(pairs):
-            k = int(model.coordinates.row[model.elements.coordinate0[element_of(model, c)] + p])
+            k = int(model.coordinates.row[model.elements.coordinate0[i] + p])
             inputs[..., 1 + len(pairs) + p] = coordinate_change(model, k, pair) / span.h
-    u = int(model.connections.item[c])
-    return user_values(model, u, inputs)[..., int(model.users.n_forces[u]) :]
+    return user_values(model, i, inputs)[..., int(model.elements.n_forces[i]) :]
 
 
 # bushings -------------------------------------------------------------------------------------------------------------

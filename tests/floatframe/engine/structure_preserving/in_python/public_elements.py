@@ -9,7 +9,7 @@ from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.callbacks.law_functions import called_law
 from floatframe.engine.compiling.coordinate_elements import LEAST_SIZE
 from floatframe.engine.kernels.model import Model
-from floatframe.engine.structure_preserving.system import element_states, multiplier_rows
+from floatframe.engine.structure_preserving.system import multiplier_rows, state_rows
 from floatframe.model.joints.rows import POSITION, VELOCITY
 from floatframe.model.rotations import cross, dot, rotated, rotation_exp
 from tests.floatframe.engine.structure_preserving.in_python.constraints import Loads, Pair, Span
@@ -144,7 +144,7 @@ def half_turned(A: Array, c: Array) -> Array:
 
 def states_at(model: Model, c: int, span: Span, dz: Array, part: float) -> Array:
     """Return the states of element c after a part of their changes, (..., n_z)."""
-    return np.asarray(span.w[list(element_states(model, c))] + part * dz)
+    return np.asarray(span.w[list(state_rows(model, c))] + part * dz)
 
 
 def element_load(

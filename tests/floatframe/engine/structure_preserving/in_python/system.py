@@ -11,7 +11,6 @@ from floatframe.engine.structure_preserving.system import (
     Connection,
     DiscreteSystem,
     coordinates_of,
-    element_of,
     line_of,
 )
 from floatframe.model.joints.rows import COUPLE, PUSH, RIM_HEIGHT, ROLL, is_held_length, kind_of
@@ -208,8 +207,7 @@ class StepSystem(DiscreteSystem):
             if law == CONTACT:
                 w[int(model.connections.w0[c]) + V_0] = speed_of_approach(model, c, own.pairs[0], span)
             if law in (COUPLER, USER_FORCE):
-                element = int(model.connections.item[c]) if law == COUPLER else element_of(model, c)
-                for p, pair in zip(coordinates_of(model, element), own.pairs, strict=True):
+                for p, pair in zip(coordinates_of(model, int(model.connections.item[c])), own.pairs, strict=True):
                     k = int(model.coordinates.row[p])
                     w[k] = float(counted(model, k, coordinate_ends(model, k, pair)[1], span.w[k]))
             for s, k in enumerate(connection.states, start=connection.first_state):
