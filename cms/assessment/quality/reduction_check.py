@@ -6,21 +6,29 @@ import numpy as np
 
 from cms.assessment.quality.body_check import check_body
 from cms.assessment.quality.errors import QualityError
-from cms.assessment.quality.of_reduction.completeness import completeness_records, static_completeness
+from cms.assessment.quality.of_reduction.completeness import (
+    completeness_records,
+    held_mass,
+    held_mass_record,
+    static_completeness,
+)
 from cms.assessment.quality.of_reduction.conditioning import column_condition, conditioning_record, dropped_record
 from cms.assessment.quality.of_reduction.contents import ReductionOptions, contents_records
 from cms.assessment.quality.of_reduction.deformation import deformation_error, deformation_record
-from cms.assessment.quality.of_reduction.frequencies import compare_frequencies, frequency_records
+from cms.assessment.quality.of_reduction.frequencies import (
+    compare_frequencies,
+    frequency_records,
+    residual_bounds,
+    residual_record,
+)
 from cms.assessment.quality.of_reduction.frf import response_comparison, response_record
 from cms.assessment.quality.of_reduction.full_shapes import full_shapes, same_body_record
-from cms.assessment.quality.of_reduction.held_mass import held_mass, held_mass_record
 from cms.assessment.quality.of_reduction.interface_stiffening import (
     has_both_kinds,
     interface_stiffening,
     stiffening_record,
 )
 from cms.assessment.quality.of_reduction.mass_properties import check_grounding, check_mass_properties
-from cms.assessment.quality.of_reduction.residuals import residual_bounds, residual_record
 from cms.assessment.quality.record import QualityRecord, information, judge
 from cms.assessment.quality.reference.full_reference import FullReference, Reference, usable_band
 from cms.assessment.quality.reference.port_model import port_model

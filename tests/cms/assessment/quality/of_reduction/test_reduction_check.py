@@ -8,14 +8,12 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from cms.assessment.quality.errors import QualityError
-from cms.assessment.quality.of_reduction.completeness import static_completeness
+from cms.assessment.quality.of_reduction.completeness import held_mass, held_mass_record, static_completeness
 from cms.assessment.quality.of_reduction.conditioning import column_condition
-from cms.assessment.quality.of_reduction.frequencies import compare_frequencies, mac
+from cms.assessment.quality.of_reduction.frequencies import compare_frequencies, mac, residual_bounds
 from cms.assessment.quality.of_reduction.full_shapes import full_shapes
-from cms.assessment.quality.of_reduction.held_mass import held_mass, held_mass_record
 from cms.assessment.quality.of_reduction.interface_stiffening import interface_stiffening
 from cms.assessment.quality.of_reduction.mass_properties import check_grounding, rigid_mass_matrix
-from cms.assessment.quality.of_reduction.residuals import residual_bounds
 from cms.assessment.quality.reduction_check import check_reduction
 from cms.assessment.quality.reference.full_reference import FullReference, usable_band
 from cms.modes.mode_set import ModeSet
