@@ -161,9 +161,9 @@ def print_free_frequencies(record: Any) -> None:
         ],
     )
     say(
-        "reduction: an estimate, and the true error is not smaller; at most: whatever modes are beyond the cutoff of "
-        "the set, no limit where it is empty; shape: in the norm of strain energy; response: estimate for the "
-        "receptance between the interfaces around this frequency, with 1 % damping"
+        "reduction: an estimate, and the true error is not smaller; at most: the largest error that modes beyond the "
+        "cutoff of the set can cause, empty without a limit; shape: in the norm of strain energy; response: estimate "
+        "for the receptance between the interfaces around this frequency, with 1 % damping"
     )
     if any(errors["is_uncertain"]):
         say("?: uncertain, a mode that the set lacks may be near: the error may be more than five times the estimate")

@@ -21,7 +21,7 @@ from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from fe_models.foundation.units import Units, unit_system
 from fe_models.meshes.cell_shapes import CELL_SHAPES, cell_jacobians, quadrature, shape_values
-from fe_models.meshes.connectivity import Connectivity, connectivity
+from fe_models.meshes.connectivity import Connectivity, coincident_nodes, connectivity
 from fe_models.meshes.mesh import Mesh, used_nodes
 from fe_models.meshes.objects.as_mesh import as_mesh
 from fe_models.meshes.quadratic_mesh import FIRST_ORDER
@@ -214,8 +214,6 @@ def report_mesh(
     MaterialError
         If a material names an unknown group, or cells have no material or two materials.
     """
-    from scipy.spatial import cKDTree
-
     mesh = as_mesh(mesh)
     units = unit_system(units) if isinstance(units, str) else units
     used = used_nodes(mesh)
@@ -235,8 +233,7 @@ def report_mesh(
     distorted = _select(geometry, lambda g: (g.lowest_inside > ROUNDING) & (g.lowest_at_nodes <= ROUNDING))
     findings += _cell_findings(mesh, inverted, degenerate, distorted)
     links = connectivity(mesh)
-    reach = max(COINCIDENCE * size, 1e-300)
-    coincident = np.flatnonzero(used)[np.isfinite(cKDTree(X).query(X, k=2, distance_upper_bound=reach)[0][:, 1])]
+    coincident = coincident_nodes(mesh, COINCIDENCE * size)
     findings += _link_findings(links, coincident, mesh)
     n_unused = int((~used).sum())
     if n_unused:

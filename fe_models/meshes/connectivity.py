@@ -4,10 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fe_models.foundation.arrays import IntArray
 from fe_models.meshes.boundary import CORNERS, boundary_facets, facets_of, first_of_equal_rows
-from fe_models.meshes.mesh import Mesh
+from fe_models.meshes.mesh import Mesh, used_nodes
 
-__all__ = ["Connectivity", "connectivity"]
+__all__ = ["Connectivity", "coincident_nodes", "connectivity"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,3 +73,12 @@ def _transitions(mesh: Mesh) -> int:
     tri = np.concatenate(triangles)
     classes, _ = first_of_equal_rows(np.concatenate([halves, tri]))
     return int(np.isin(classes[: len(halves)], classes[len(halves) :]).reshape(4, -1).any(axis=0).sum())
+
+
+def coincident_nodes(mesh: Mesh, distance: float) -> IntArray:
+    """Return the used nodes with another used node within the distance [m], ascending, (n,)."""
+    from scipy.spatial import cKDTree
+
+    nodes = np.flatnonzero(used_nodes(mesh))
+    apart, _ = cKDTree(mesh.nodes[nodes]).query(mesh.nodes[nodes], k=2, distance_upper_bound=max(distance, 1e-300))
+    return nodes[np.isfinite(apart[:, 1])]

@@ -321,8 +321,7 @@ def assign_shell_properties(
     if missing:
         raise ShellError(
             f"shells: cells without a thickness: {counts_of(missing)}; {groups_of(mesh.cell_sets, missing, 'one')}; "
-            "cells outside "
-            "the body are left out by  "
+            "cells outside the body are left out by "
             'read_shell_mesh(groups=...) or, in a job, accept = ["left-out"]'
         )
     return used, number

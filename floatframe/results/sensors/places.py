@@ -210,13 +210,16 @@ class PlaceSensor:
 
 def absolute_rows(place: SmallPlace, quantity: str) -> Rows:
     """Return three rows for a quantity of a point, in axes that rotate with the steady motion."""
-    return {
-        "position": place.moved,
-        "velocity": place.velocity,
-        "acceleration": place.acceleration,
-        "rotation-vector": place.rotation.mapped(inverse_left_jacobian(place.axes)),
-        "angular-velocity": place.omega,
-    }[quantity]
+    match quantity:
+        case "rotation-vector":
+            return place.rotation.mapped(inverse_left_jacobian(place.axes))
+        case "angular-velocity":
+            return place.omega
+        case "velocity":
+            return place.velocity
+        case "acceleration":
+            return place.acceleration
+    return place.moved
 
 
 def inverse_left_jacobian(A: Array) -> Array:

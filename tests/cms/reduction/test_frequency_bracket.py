@@ -14,6 +14,7 @@ from cms.cli.info import print_free_frequencies
 from cms.modes.families.families import Families
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets import MODE_SETS
+from cms.reduction.error_estimates import cutoff_of
 from cms.reduction.frequency_bracket import largest_errors
 from cms.reduction.reduction import reduce
 from tests.bodies import bar
@@ -46,6 +47,24 @@ def close_modes():
                     )
     true, estimate, largest, is_uncertain = np.hstack(rows)
     return true, estimate, largest, is_uncertain > 0
+
+
+SETS_WITH_CUTOFF = (
+    "craig-bampton", "craig-bampton-ir", "multilevel", "attachment", "herting", "rubin", "dual-craig-bampton", "normal",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SETS_WITH_CUTOFF)
+def test_shapes_beside_a_set_have_less_mass_than_its_cutoff_allows(name):
+    """Shapes K-orthogonal to the set, without rigid-body motion, by a null space: their largest mass / stiffness."""
+    body = fm.couple(bar(9, 3, 3, kind="hexahedron"))
+    K, M = body.K.toarray(), body.M.toarray()
+    with Families(body, announce=False) as families:
+        modes = MODE_SETS[name](families, n_modes=21)
+    M_rigid, K_V = M @ la.eigh(K, M)[1][:, :6], K @ np.asarray(modes.columns)
+    beside = la.null_space(np.hstack([M_rigid / abs(M_rigid).max(), K_V / abs(K_V).max()]).T, rcond=1e-9)
+    largest = la.eigh(beside.T @ M @ beside, beside.T @ K @ beside, eigvals_only=True)[-1]
+    assert 0.5 < largest * cutoff_of(modes) ** 2 < 1.0
 
 
 def test_an_estimate_far_too_small_is_marked_uncertain(close_modes):
