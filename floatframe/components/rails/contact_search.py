@@ -3,8 +3,13 @@
 The position of a wheel relative to its rail is given by u, the outward shift of the wheel, the roll phi (outer side
 up), the yaw psi, and the height h of its centre above the nominal radius. A rail does not change along the track.
 Therefore each circle of the wheel, at s, can touch the rail only at the point whose normal is perpendicular to the rail
-(Wang's line of contact, see docs/rails.md). The wheel is reduced to a curve (x, y, z)(s) that faces the profile Z(y) of
-the rail, and its penetration is p(s) = Z(y(s) + u + offset) - z(s) - h.
+(Wang's line of contact). With the axle a = (-sin psi cos phi, cos psi cos phi, sin phi), f = (cos psi, sin psi, 0) and
+d = (sin psi sin phi, -cos psi sin phi, cos phi), the angle t of this point on its circle follows from
+
+    f_x sin t - d_x cos t = R'(s) a_x
+
+The wheel is reduced to a curve (x, y, z)(s) that faces the profile Z(y) of the rail, and its penetration is
+p(s) = Z(y(s) + u + offset) - z(s) - h.
 
 - rigid: the local maxima of p within a tolerance of the highest one;
 - quasi-elastic: q = eps log( int w exp(p/eps) dy / L ), a smoothed maximum over heights of about eps. Its gradient is

@@ -2,7 +2,7 @@
 
 The distance of the unloaded surfaces is A x² + B y², with A in the direction of rolling. With E* = G/(1 - nu) of two
 equal bodies and the complete elliptic integrals K and E of the eccentricity e of the ellipse, k = short/long semi-axis
-(theory in docs/rails.md):
+(1 - k² = e²):
 
 (1)  ratio of the curvatures along the long axis L and the short axis S:  C_L / C_S = (K - E) / (E/k² - K)
 (2)  L = (3 N E(e) / (2 pi k² (C_L + C_S) E*))^(1/3),  S = k L

@@ -1,7 +1,8 @@
 """The Magic Formula 5.2 and 6.1: forces and moments of a tyre as functions of load, slip, inclination and pressure.
 
 Values have the signs of the property file (ISO or adapted SAE), and are for the side for which the file was made;
-`magic_formula_law` converts them. The formulas are in docs/wheels.md, in the order of the code.
+`magic_formula_law` converts them. The formulas are those of Pacejka (2012) and, for version 6.1,
+Besselink, Schmeitz & Pacejka (2010).
 """
 
 import numpy as np

@@ -2,7 +2,7 @@
 
 At a constant mechanical speed Omega, the equations of the motor are linear with constant coefficients. Each component k
 of the supply, U_k e^(j k theta) with d theta/dt = w = 2 pi f, produces its own currents and fluxes e^(j k theta)
-(equations in docs/hydraulics_and_drives.md):
+(equations in `floatframe.components.drives.induction_motor`):
 
     [R_s + j k w L_s        j k w L_m         ] [i_s]   [U_k]
     [j (k w - p Omega) L_m  R_r + j (k w - p Omega) L_r] [i_r] = [0]
