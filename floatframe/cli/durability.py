@@ -188,6 +188,8 @@ def shake_command(
     def with_curves(path: Path) -> dict[Path, bytes]:
         """Return the record, and its curves in an archive beside it."""
         beside = path.with_suffix(".npz")
+        if beside in paths:  # the table
+            beside = path.with_name(f"{path.stem}_curves.npz")
         light, curves = light_record(shake_record(result), beside.name)
         files = {path: (dumps(light, separators=(",", ":")) + "\n").encode()}
         if curves:
@@ -279,7 +281,7 @@ def level(words: str, unit: str, where: str) -> "Level":
 
 def print_result(result: "ShakeResult") -> None:
     """Print conversions, main modes, largest outputs of every run, and notches."""
-    from floatframe.durability.shaking.record import conversions, table_rows
+    from floatframe.durability.shaking.record import conversions, run_title, table_rows
 
     model, masses = result.model, result.masses
     for line in conversions(model):
@@ -313,7 +315,7 @@ def print_result(result: "ShakeResult") -> None:
             if any(r[c] is not None for r in rows)
         ]
         print_table(
-            f"{kind.capitalize()} {test}, {direction}",
+            f"{run_title(kind.capitalize(), test)}, {direction}",
             ("output", "unit", f"{rows[0][7]}>", "at", "with uncertainty>", *(name for name, _ in extra)),
             [
                 (
@@ -334,17 +336,17 @@ def print_result(result: "ShakeResult") -> None:
             if math.isnan(v):  # a force
                 continue
             say(
-                f"{run.kind} {run.test}, {name}: at the end the base has {v:.5g} "
+                f"{run_title(run.kind, run.test)}, {name}: at the end the base has {v:.5g} "
                 f"{model.units.length_symbol}/{model.units.time_symbol} and {d:.5g} {model.units.length_symbol}"
             )
         if run.synthesis is not None:
             say(
-                f"{run.kind} {run.test}: spectrum reached within {run.synthesis.decibels.min():+.2f} to "
+                f"{run_title(run.kind, run.test)}: spectrum reached within {run.synthesis.decibels.min():+.2f} to "
                 f"{run.synthesis.decibels.max():+.2f} dB of its target"
             )
     notches = [
         (
-            f"{kind} {test}, {direction}",
+            f"{run_title(kind, test)}, {direction}",
             f"{n.first:.5g} to {n.last:.5g}",
             f"{n.deepest:.5g}",
             f"{n.depth:.2f}",

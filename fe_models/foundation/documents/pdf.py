@@ -133,12 +133,12 @@ def head(document: Document, width: float) -> list[Any]:
     )  # fmt: skip
     flow = [words_of(document.title, size=17, bold=True, color=INK), Spacer(1, 4)]
     flow += [words_of(document.facts, size=8.5, color=SOFT), Spacer(1, 10), answer, Spacer(1, 10)]
-    if n := len(told.figures):
+    if told.figures:
         flow += [
             Grid(
                 [[words_of(value, size=12, bold=True, color=INK) for value, _ in told.figures],
                  [words_of(words, size=7, color=SOFT) for _, words in told.figures]],
-                colWidths=[width / n] * n,
+                colWidths=column_widths([[(value, 12.0), (words, 7.0)] for value, words in told.figures], width),
                 style=[("VALIGN", (0, 0), (-1, -1), "TOP"), ("LEFTPADDING", (0, 0), (-1, -1), 0)],
             ),
             Spacer(1, 8),
@@ -257,7 +257,7 @@ def table_flow(block: TextTable, width: float) -> list[Any]:
         lines.append(line)
     if not lines:
         return []
-    widths = [share * width for share in block.widths] or automatic_widths(block.headings, rows, width)
+    widths = [share * width for share in block.widths] or column_widths(texts_of(block.headings, rows), width)
     grid = Grid(
         lines, colWidths=widths, repeatRows=int(any(block.headings)), style=style,
         hAlign="LEFT",
@@ -266,24 +266,36 @@ def table_flow(block: TextTable, width: float) -> list[Any]:
     return [*caption, grid, Spacer(1, 7)]
 
 
-def automatic_widths(headings: Sequence[str], rows: Sequence[Sequence[Cell]], width: float) -> list[float]:
-    """Return column widths: each fits its longest word, and the remaining width follows the longest texts."""
-    from reportlab.pdfbase.pdfmetrics import stringWidth
-
-    def wide(words: str, size: float) -> float:
-        return float(stringWidth(words, "Report-Bold", size))
-
+def texts_of(headings: Sequence[str], rows: Sequence[Sequence[Cell]]) -> list[list[tuple[str, float]]]:
+    """Return the texts of each column with their font sizes."""
     texts = [[(heading.removesuffix(">"), 6.8)] for heading in headings]
     for row in rows:
         if len(row) == len(headings):
             for k, cell in enumerate(row):
                 texts[k] += [(cell.text, 7.0), (cell.note, 6.3)]
-    least = np.array([max(wide(word, size) for words, size in column for word in (words.split() or [""]))
-                      for column in texts]) + 7.5  # fmt: skip
-    wanted = np.array([max(min(wide(words, size), WIDEST) for words, size in column) for column in texts]) + 7.5
+    return texts
+
+
+def column_widths(texts: Sequence[Sequence[tuple[str, float]]], width: float) -> list[float]:
+    """Return column widths for texts with their font sizes.
+
+    If every text fits on one line, columns are as wide in proportion. Otherwise each fits its longest word, and the
+    remaining width follows the longest texts.
+    """
+    from reportlab.pdfbase.pdfmetrics import stringWidth
+
+    def wide(words: str, size: float) -> float:
+        return float(stringWidth(words, "Report-Bold", size)) + 7.5
+
+    natural = np.array([max(wide(words, size) for words, size in column) for column in texts])
+    if natural.sum() <= width:
+        return (natural * width / natural.sum()).tolist()
+    least = np.array([
+        max(wide(word, size) for words, size in column for word in (words.split() or [""])) for column in texts
+    ])  # fmt: skip
     if least.sum() >= width:
         return (least * width / least.sum()).tolist()
-    more = np.maximum(wanted - least, 0.0) + 1e-3
+    more = np.maximum(np.minimum(natural, WIDEST) - least, 0.0) + 1e-3
     return (least + more * (width - least.sum()) / more.sum()).tolist()
 
 

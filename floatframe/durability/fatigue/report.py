@@ -22,8 +22,7 @@ from floatframe.errors import FatigueError
 __all__ = ["cycles_at", "exceedances", "fatigue_document"]
 
 
-# the cycles at one place: the load spectrum next to the S-N curve
-# -------------------------------------------------------
+# the cycles at one place: the load spectrum next to the S-N curve -----------------------------------------------------
 
 
 def cycles_at(result: FatigueResult, blocks: Sequence[LoadBlock], place: int) -> Array:
@@ -78,6 +77,7 @@ def exceedances(cycles: Array, n_points: int = 200) -> tuple[Array, Array]:
 # report ---------------------------------------------------------------------------------------------------------------
 
 
+LEAST_SHOWN = 0.01  #: smallest amplitude in the plot, relative to the largest
 MOST_CYCLES = 1e10  #: largest number of cycles in the plot of S-N curves
 COLORS = (INK, "#0072B2", "#009E73", "#CC79A7", "#56B4E9")  #: colours of the S-N curves of materials
 
@@ -160,7 +160,7 @@ def worst_section(record: dict[str, Any]) -> Section:
         shares = [value / each["damage"] if each["damage"] else 0.0 for value in each["of_blocks"].values()]
         cells += [Cell(f"{share:.0%}", "n") for share in shares] if len(names) > 1 else []
         rows.append(cells)
-    lead = "The worst nodes" + (", with the share of each block in their damage." if len(names) > 1 else ".")
+    lead = "With the share of each block in their damage." if len(names) > 1 else ""
     return Section("worst", "Worst nodes", (TextTable(headings, rows),), lead)
 
 
@@ -178,8 +178,13 @@ def curve_section(made: Assessment, record: dict[str, Any]) -> Section:
     if made.blocks and not made.result.criterion.is_shear and record["worst"]:
         cycles = cycles_at(made.result, made.blocks, int(made.result.worst()[0]))
         name = f"{record['worst'][0]['place']}: cycles of at least this amplitude"
-        lines.append(Line(*exceedances(cycles), name, "#D55E00"))
-        words += " Also shown: equivalent amplitudes at the worst place in one programme, including mean stress."
+        count, amplitude = exceedances(cycles)
+        is_shown = amplitude > LEAST_SHOWN * amplitude.max(initial=0.0)
+        lines.append(Line(count[is_shown], amplitude[is_shown], name, "#D55E00"))
+        words += (
+            " Also shown: equivalent amplitudes at the worst place in one programme, including mean stress, down to "
+            f"{LEAST_SHOWN:.0%} of the largest."
+        )
     upwards = Axis(f"stress amplitude [{unit}]", is_log=True)
     chart = Chart(Axis("cycles", is_log=True), (upwards,), tuple(lines), 380)
     return Section("curve", "S-N curve and load spectrum", (Figure("sn", chart, words),), "", "S-N curve")

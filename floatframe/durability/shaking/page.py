@@ -29,7 +29,14 @@ from floatframe.durability.shaking.page_charts import (
     sine_chart,
     spectra_chart,
 )
-from floatframe.durability.shaking.record import conversions, in_tables, level_scale, reported_rows, worst_nodes
+from floatframe.durability.shaking.record import (
+    conversions,
+    in_tables,
+    level_scale,
+    reported_rows,
+    run_title,
+    worst_nodes,
+)
 from floatframe.durability.shaking.shake import ShakeResult
 
 __all__ = ["shake_document"]
@@ -120,7 +127,7 @@ def summary_section(result: ShakeResult) -> Section:
             factor, unit = in_tables(result.model, run.outputs[k])
             rows.append(
                 [
-                    Cell(f"{kind_of(run)} {run.test}, {run.direction}" if n == 0 else "", "name"),
+                    Cell(f"{run_title(kind_of(run), run.test)}, {run.direction}" if n == 0 else "", "name"),
                     Cell(run.outputs[k].name, note=run.outputs[k].place),
                     Cell(number(factor * peaks[k]), "n"),
                     Cell(number(factor * uncertain[k]), "n"),
@@ -243,10 +250,10 @@ def sine_section(result: ShakeResult, run: SineRun, number_: int) -> Section:
     )
     return Section(
         key,
-        f"Sine {run.test}, {run.direction}",
+        f"{run_title('Sine', run.test)}, {run.direction}",
         (*notch_part(result, "sine", notched, key), drawn, TextTable(headings, rows)),
         f"{words}. Amplitudes, 0 to peak.",
-        f"Sine {run.test} {run.direction.partition(':')[2]}",
+        f"{run_title('Sine', run.test)} {run.direction.partition(':')[2]}",
     )
 
 
@@ -319,11 +326,11 @@ def random_section(result: ShakeResult, run: RandomRun, number_: int) -> Section
     ]
     return Section(
         key,
-        f"Random {run.test}, {run.direction}",
+        f"{run_title('Random', run.test)}, {run.direction}",
         parts,
         f"Input {given}. Integrals over {len(run.band.frequencies)} frequencies; two nested rules differ by "
         f"{run.error.max():.1e} of an rms at most.",
-        f"Random {run.test} {run.direction.partition(':')[2]}",
+        f"{run_title('Random', run.test)} {run.direction.partition(':')[2]}",
     )
 
 
@@ -404,10 +411,10 @@ def time_section(result: ShakeResult, run: TimeRun, number_: int) -> Section:
         made = f" The spectrum reached deviates from its target by {off.min():+.2f} to {off.max():+.2f} dB."
     return Section(
         key,
-        f"{run.kind.capitalize()} {run.test}, {run.direction}",
+        f"{run_title(run.kind.capitalize(), run.test)}, {run.direction}",
         (*blocks, TextTable(["output", "largest>", "at ms>", "with uncertainty>", "unit"], rows)),
         f"{run.words[:1].upper()}{run.words[1:]}. {left}.{made}",
-        f"{run.kind.capitalize()} {run.test} {run.direction.partition(':')[2]}",
+        f"{run_title(run.kind.capitalize(), run.test)} {run.direction.partition(':')[2]}",
     )
 
 

@@ -14,8 +14,8 @@ from floatframe.durability.shaking.shake import ShakeResult
 from floatframe.durability.shaking.structure.model import Output, ShakenModel
 
 __all__ = [
-    "COLUMNS", "MOST_NUMBERS", "ROUNDING", "conversions", "in_tables", "light_record", "shake_record", "shake_table",
-    "size_of_curves", "table_rows", "worst_nodes",
+    "COLUMNS", "MOST_NUMBERS", "ROUNDING", "conversions", "in_tables", "light_record", "run_title", "shake_record",
+    "shake_table", "size_of_curves", "table_rows", "worst_nodes",
 ]  # fmt: skip
 
 FEW = 50  #: length of a list above which it is a curve
@@ -252,6 +252,11 @@ def notched_record(model: ShakenModel, kind: str, run: NotchedRun) -> dict[str, 
             for n in run.notches
         ],
     }
+
+
+def run_title(kind: str, test: str) -> str:
+    """Return kind and name of a test; tests of the command line are named after their kind."""
+    return kind if test == kind.lower() else f"{kind} {test}"
 
 
 def table_rows(result: ShakeResult) -> list[tuple[Any, ...]]:

@@ -2,7 +2,13 @@
 // Charts as SVG: lines, bars and matrices over linear or logarithmic axes, one panel below the other.
 // Point at a line to read it, drag across to zoom, double-click to see all, click a name to hide its line.
 (function () {
-  const all = JSON.parse(document.getElementById("charts").textContent);
+  const { charts: all, arrays } = JSON.parse(document.getElementById("charts").textContent);
+  const numbers = arrays.map((text) => Array.from(new Float32Array(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer)));
+  for (const { items } of Object.values(all)) {
+    for (const line of items.filter((item) => item.kind === "line")) {
+      for (const name of ["x", "y", "other_x"]) if (line[name] !== null) line[name] = numbers[line[name]];
+    }
+  }
   const SVG = "http://www.w3.org/2000/svg";
   const DASHES = { solid: "", dash: "7 4", dot: "2 3", dashdot: "7 3 2 3", longdash: "11 4", longdashdot: "11 4 2 4" };
   const MARKS = {

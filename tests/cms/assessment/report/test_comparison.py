@@ -272,7 +272,7 @@ def view(started, page):
 
 def test_the_page_opens_offline_and_shows_every_chart(view, page, tmp_path):
     text = page.read_text(encoding="utf-8")
-    charts = json.loads(re.search(r'id="charts">(.*?)</script>', text, re.DOTALL).group(1))
+    charts = json.loads(re.search(r'id="charts">(.*?)</script>', text, re.DOTALL).group(1))["charts"]
     drawn = view.evaluate("[...document.querySelectorAll('.chart:has(.drawing)')].map((c) => c.id)")
     assert sorted(drawn) == sorted(charts)
     assert view.evaluate("document.documentElement.scrollWidth <= window.innerWidth")

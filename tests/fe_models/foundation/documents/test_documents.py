@@ -1,5 +1,6 @@
 """Documents as pages, as PDF and as JSON: every block, names that would break a page, and charts in a browser."""
 
+import base64
 import json
 import re
 import zlib
@@ -92,9 +93,13 @@ def test_a_page_says_everything_and_needs_nothing():
         assert told in words
     assert not re.search(r'<(?:script|link|img|iframe)[^>]+(?:src|href)="(?!data:)', page)
     assert len(page) < 80_000
-    charts = json.loads(re.search(r'id="charts">(.*?)</script>', page, re.DOTALL)[1])
-    assert sorted(charts) == sorted(("one", "two", "three", "four", "five"))
-    assert charts["one"]["items"][0]["y"][7] is None
+    data = json.loads(re.search(r'id="charts">(.*?)</script>', page, re.DOTALL)[1])
+    assert sorted(data["charts"]) == sorted(("one", "two", "three", "four", "five"))
+    line = data["charts"]["one"]["items"][0]
+    x, y = (np.frombuffer(base64.b64decode(data["arrays"][line[name]]), "<f4") for name in ("x", "y"))
+    np.testing.assert_array_equal(np.isnan(y), np.arange(len(X)) == 7)
+    np.testing.assert_allclose(x, X, rtol=1e-6, atol=0)
+    assert len(data["arrays"]) == len(set(data["arrays"]))
 
 
 def test_a_page_without_charts_carries_no_drawing():
