@@ -18,12 +18,13 @@ K_r (6 n²).
 """
 
 from floatframe.engine.kernels.compiler.compilation import loops, small, view
-from floatframe.engine.kernels.dense import add_products, slice_of
+from floatframe.engine.kernels.dense import add_products, flat, matrix_at, rows_of
 from floatframe.engine.kernels.model import C1, C2, C3, C4, DAMPING, K_ROTATION, K_TRANSLATION, MASS, S_AB, STIFFNESS
 from floatframe.engine.kernels.vector import (
     add,
     add_column,
     axial,
+    copy,
     cross,
     dot,
     matrix,
@@ -65,50 +66,55 @@ __all__ = [
 
 
 @view
-def block(types, t, which, size):
-    """Return one constant matrix of a type of bodies as a view of the flat array of all matrices."""
-    start = types.block0[t, which]
-    return types.blocks[start : start + size]
+def block(types, t, which, rows, columns):
+    """Return one constant matrix (rows, columns) of a type of bodies as a view of the flat array of all matrices."""
+    return matrix_at(types.blocks, types.block0[t, which], rows, columns)
 
 
 @view
 def modal_matrix(types, t, which, n):
     """Return one constant matrix (n, n) of a type of bodies, which is not stored as a diagonal."""
-    return block(types, t, which, n * n).reshape((n, n))
+    return block(types, t, which, n, n)
+
+
+@view
+def modal_diagonal(types, t, which, n):
+    """Return one constant matrix (n, n) of a type of bodies that is stored as a diagonal, as a vector."""
+    return block(types, t, which, 1, n)[0]
 
 
 @view
 def newton_block(model, work, i):
     """Return the Newton matrix of body i, (6 + n, 6 + n), as a view of the flat array of all matrices."""
     n = 6 + model.bodies.n_q[i]
-    return work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((n, n))
+    return matrix_at(work.solver.H, model.bodies.h0[i], n, n)
 
 
 @loops
-def column(A, n, k):
-    """Return column k of a matrix A [a, k] that is stored flat."""
-    return A[k], A[n + k], A[2 * n + k]
+def column(A, k):
+    """Return the first three numbers of column k of a matrix A [a, k]."""
+    return A[0, k], A[1, k], A[2, k]
 
 
 @loops
-def tensor(A, n, k):
-    """Return matrix k of a tensor A [ab, k] that is stored flat."""
-    return column(A, n, k), column(A[3 * n :], n, k), column(A[6 * n :], n, k)
+def tensor(A, k):
+    """Return matrix k of a tensor A [ab, k]."""
+    return column(A, k), column(A[3:], k), column(A[6:], k)
 
 
 @loops
-def column_sum(A, n, x):
+def column_sum(A, x):
     """Return Σ A[a, k] x_k."""
     total = (0.0, 0.0, 0.0)
-    for k in range(n):
-        total = add(total, scaled(x[k], column(A, n, k)))
+    for k in range(A.shape[1]):
+        total = add(total, scaled(x[k], column(A, k)))
     return total
 
 
 @loops
-def tensor_sum(A, n, x):
+def tensor_sum(A, x):
     """Return Σ A[ab, k] x_k."""
-    return column_sum(A, n, x), column_sum(A[3 * n :], n, x), column_sum(A[6 * n :], n, x)
+    return column_sum(A, x), column_sum(A[3:], x), column_sum(A[6:], x)
 
 
 @loops
@@ -119,15 +125,15 @@ def trace_less(W):
 
 
 @loops
-def coupling(second, W, n, k):
+def coupling(second, W, k):
     """Return B_k, the coupling of mode k with rotation, from the invariants 2C (`second`) and W."""
-    return add(column(second, n, k), axial(tensor(W, n, k)))
+    return add(column(second, k), axial(tensor(W, k)))
 
 
 @loops
-def inertia_rate(third, W, n, k):
+def inertia_rate(third, W, k):
     """Return D_k, where dJ/dq_k = D_k + D_kᵀ, from the invariants 3C (`third`) and W."""
-    return matrix_sum(tensor(third, n, k), trace_less(tensor(W, n, k)))
+    return matrix_sum(tensor(third, k), trace_less(tensor(W, k)))
 
 
 @loops
@@ -146,14 +152,16 @@ def moved_inertia(m, s, J, p):
 @small
 def modal_number(types, t, n, which, k):
     """Return entry k of the diagonal of a modal matrix M, K or D."""
-    return types.blocks[types.block0[t, which] + k * (1 if types.is_diagonal[t, which - MASS] else n + 1)]
+    if types.is_diagonal[t, which - MASS]:
+        return modal_diagonal(types, t, which, n)[k]
+    return modal_matrix(types, t, which, n)[k, k]
 
 
 @loops
 def modal_term(types, t, n, which, factor, x, out):
     """Add `factor` times the product of a modal matrix M, K or D with x to `out`, (n_q,)."""
     if types.is_diagonal[t, which - MASS]:
-        diagonal = block(types, t, which, n)
+        diagonal = modal_diagonal(types, t, which, n)
         for k in range(n):
             out[k] += factor * (diagonal[k] * x[k])
     else:
@@ -167,20 +175,20 @@ def modal_term(types, t, n, which, factor, x, out):
 
 @loops
 def constant_products(types, t, which, x, out):
-    """Write Σ_l A_l x_l for one constant array of a type of bodies, whose rows A_l are as long as `out`."""
-    out[:] = 0.0
-    add_products(block(types, t, which, x.shape[0] * out.shape[0]), x, out)
+    """Write Σ_l A_l x_l for one constant array of a type of bodies, whose matrices A_l have the shape of `out`."""
+    products = flat(out)
+    products[:] = 0.0
+    add_products(block(types, t, which, x.shape[0], products.shape[0]), x, products)
 
 
 @loops
 def shape_moments(types, t, n, q, first):
-    """Write 1C(q) = ds/dq of a type of bodies into `first`, (3 n,); return its first moment s(q)."""
-    own = block(types, t, C1, 3 * n)
-    for j in range(3 * n):
-        first[j] = own[j]
+    """Write 1C(q) = ds/dq of a type of bodies into `first`, (3, n); return its first moment s(q)."""
+    own = block(types, t, C1, 3, n)
+    copy(flat(own), flat(first))
     if types.is_stiffened[t]:
-        add_products(block(types, t, K_TRANSLATION, 3 * n * n), q, first)
-    return add(vector(types.S[t]), scaled(0.5, add(column_sum(own, n, q), column_sum(first, n, q))))
+        add_products(block(types, t, K_TRANSLATION, n, 3 * n), q, flat(first))
+    return add(vector(types.S[t]), scaled(0.5, add(column_sum(own, q), column_sum(first, q))))
 
 
 @loops
@@ -191,12 +199,11 @@ def first_moments(model, work, i):
     if n == 0:
         put(bodies.s[i], 0, vector(types.S[t]))
         return
-    first, end = 3 * q0, 3 * (q0 + n)
-    put(bodies.s[i], 0, shape_moments(types, t, n, work.state.q[q0 : q0 + n], bodies.C1[first:end]))
+    put(bodies.s[i], 0, shape_moments(types, t, n, work.state.q[q0 : q0 + n], rows_of(bodies.C1, 3, q0, n)))
     if types.is_stiffened[t]:
         q_dot = work.state.u[u0 : u0 + n]
-        constant_products(types, t, K_TRANSLATION, q_dot, bodies.K_t_q_dot[first:end])
-        constant_products(types, t, K_ROTATION, q_dot, bodies.K_r_q_dot[first:end])
+        constant_products(types, t, K_TRANSLATION, q_dot, rows_of(bodies.K_t_q_dot, 3, q0, n))
+        constant_products(types, t, K_ROTATION, q_dot, rows_of(bodies.K_r_q_dot, 3, q0, n))
 
 
 @loops
@@ -228,33 +235,30 @@ def modal_forces(model, work, i, a):
     t, n, q0, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i] + 6
     q, q_dot, q_ddot = work.state.q[q0 : q0 + n], work.state.u[u0 : u0 + n], work.state.u_dot[u0 : u0 + n]
     omega, alpha = vector(work.state.u[u0 - 3 :]), vector(work.state.u_dot[u0 - 3 :])
-    W, Y, first = slice_of(bodies.W, 9, q0, n), slice_of(bodies.Y, 3, q0, n), slice_of(bodies.C1, 3, q0, n)
+    W, Y, first = rows_of(bodies.W, 9, q0, n), rows_of(bodies.Y, 3, q0, n), rows_of(bodies.C1, 3, q0, n)
     constant_products(types, t, S_AB, q, W)
     constant_products(types, t, C4, q_dot, Y)
-    second, third, h = block(types, t, C2, 3 * n), block(types, t, C3, 9 * n), bodies.residual[u0 : u0 + n]
+    second, third, h = block(types, t, C2, 3, n), block(types, t, C3, 9, n), bodies.residual[u0 : u0 + n]
     zero = (0.0, 0.0, 0.0)
     tau, G, D_q_dot = zero, (zero, zero, zero), (zero, zero, zero)
     for k in range(n):
-        D_k, B_k = inertia_rate(third, W, n, k), coupling(second, W, n, k)
-        G = matrix_sum(G, scaled_matrix(0.5 * q[k], matrix_sum(tensor(third, n, k), D_k)))  # C_k + T_k/2
+        D_k, B_k = inertia_rate(third, W, k), coupling(second, W, k)
+        G = matrix_sum(G, scaled_matrix(0.5 * q[k], matrix_sum(tensor(third, k), D_k)))  # C_k + T_k/2
         D_q_dot = matrix_sum(D_q_dot, scaled_matrix(q_dot[k], D_k))
         tau = add(tau, scaled(q_ddot[k], B_k))
         h[k] = (
-            dot(column(first, n, k), a)
-            + dot(B_k, alpha)
-            + 2 * dot(column(Y, n, k), omega)
-            - dot(omega, turned(D_k, omega))
+            dot(column(first, k), a) + dot(B_k, alpha) + 2 * dot(column(Y, k), omega) - dot(omega, turned(D_k, omega))
         )
     put_matrix(bodies.J[i], matrix_sum(matrix(types.J0[t]), matrix_sum(G, transposed(G))))
     put_matrix(bodies.D_q_dot[i], D_q_dot)
     modal_term(types, t, n, MASS, 1.0, q_ddot, h)
     modal_term(types, t, n, DAMPING, 1.0, q_dot, h)
     modal_term(types, t, n, STIFFNESS, 1.0, q, h)
-    f = add(column_sum(first, n, q_ddot), cross(scaled(2.0, omega), column_sum(first, n, q_dot)))
+    f = add(column_sum(first, q_ddot), cross(scaled(2.0, omega), column_sum(first, q_dot)))
     tau = add(tau, scaled(2.0, turned(D_q_dot, omega)))
     if types.is_stiffened[t]:
-        f = add(f, column_sum(slice_of(bodies.K_t_q_dot, 3, q0, n), n, q_dot))
-        tau = add(tau, column_sum(slice_of(bodies.K_r_q_dot, 3, q0, n), n, q_dot))
+        f = add(f, column_sum(rows_of(bodies.K_t_q_dot, 3, q0, n), q_dot))
+        tau = add(tau, column_sum(rows_of(bodies.K_r_q_dot, 3, q0, n), q_dot))
     return f, tau
 
 
@@ -267,15 +271,15 @@ def body_mass_product(model, work, i, v, out):
     types, bodies = model.body_types, work.bodies
     t, n, q0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i]
     s, v_O, omega, q_dot = vector(bodies.s[i]), vector(v), vector(v[3:]), v[6:]
-    first = slice_of(bodies.C1, 3, q0, n)
-    put(out, 0, add(scaled(types.mass[t], v_O), add(cross(omega, s), column_sum(first, n, q_dot))))
+    first = rows_of(bodies.C1, 3, q0, n)
+    put(out, 0, add(scaled(types.mass[t], v_O), add(cross(omega, s), column_sum(first, q_dot))))
     put(out, 3, add(cross(s, v_O), turned(bodies.J[i], omega)))
     if n > 0:
-        W, second = slice_of(bodies.W, 9, q0, n), block(types, t, C2, 3 * n)
+        W, second = rows_of(bodies.W, 9, q0, n), block(types, t, C2, 3, n)
         for k in range(n):
-            B_k = coupling(second, W, n, k)
+            B_k = coupling(second, W, k)
             put_sum(out, 3, scaled(q_dot[k], B_k))
-            out[6 + k] = dot(column(first, n, k), v_O) + dot(B_k, omega)
+            out[6 + k] = dot(column(first, k), v_O) + dot(B_k, omega)
         modal_term(types, t, n, MASS, 1.0, q_dot, out[6:])
 
 
@@ -301,7 +305,7 @@ def body_tangent(model, work, i, c_m, c_d, c_k, H, turn):
     bodies, n, q0, u0 = work.bodies, model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
     m, a, s, J = model.body_types.mass[model.bodies.kind[i]], vector(bodies.a_B[i]), vector(bodies.s[i]), bodies.J[i]
     omega, q_dot = vector(work.state.u[u0 + 3 :]), work.state.u[u0 + 6 : u0 + 6 + n]
-    v, gyro = column_sum(slice_of(bodies.C1, 3, q0, n), n, q_dot), gyroscopic(omega, J, matrix(bodies.D_q_dot[i]))
+    v, gyro = column_sum(rows_of(bodies.C1, 3, q0, n), q_dot), gyroscopic(omega, J, matrix(bodies.D_q_dot[i]))
     spin = matrix_sum(tilde(add(scaled(2.0, v), cross(omega, s))), product(tilde(omega), tilde(s)))
     H[:, :] = 0.0
     turn[:, :] = 0.0
@@ -331,9 +335,9 @@ def spin_columns(model, work, i, c_d, H):
     for r in range(3):
         put_sum(H[r], 3, cross(turn, cross(s, unit(r))))
         put_sum(H[3 + r], 3, cross(turn, vector(bodies.J[i, r])))
-    W, second = slice_of(bodies.W, 9, q0, n), block(types, t, C2, 3 * n)
+    W, second = rows_of(bodies.W, 9, q0, n), block(types, t, C2, 3, n)
     for k in range(n):
-        put_sum(H[6 + k], 3, cross(turn, coupling(second, W, n, k)))
+        put_sum(H[6 + k], 3, cross(turn, coupling(second, W, k)))
 
 
 @loops
@@ -345,11 +349,11 @@ def modal_tangent(model, work, i, c_m, c_d, c_k, H, turn):
     """
     types, bodies = model.body_types, work.bodies
     t, n, q0, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
-    W, Y, first = slice_of(bodies.W, 9, q0, n), slice_of(bodies.Y, 3, q0, n), slice_of(bodies.C1, 3, q0, n)
-    second, third = block(types, t, C2, 3 * n), block(types, t, C3, 9 * n)
+    W, Y, first = rows_of(bodies.W, 9, q0, n), rows_of(bodies.Y, 3, q0, n), rows_of(bodies.C1, 3, q0, n)
+    second, third = block(types, t, C2, 3, n), block(types, t, C3, 9, n)
     a, omega, alpha = vector(bodies.a_B[i]), vector(work.state.u[u0 + 3 :]), vector(work.state.u_dot[u0 + 3 :])
     for k in range(n):
-        b, D_k, B_k = column(first, n, k), inertia_rate(third, W, n, k), coupling(second, W, n, k)
+        b, D_k, B_k = column(first, k), inertia_rate(third, W, k), coupling(second, W, k)
         J_k = matrix_sum(D_k, transposed(D_k))  # dJ/dq_k
         D_omega, J_omega, turning = turned(D_k, omega), turned(J_k, omega), cross(omega, b)
         by_q = add(cross(alpha, b), cross(omega, turning))
@@ -357,7 +361,7 @@ def modal_tangent(model, work, i, c_m, c_d, c_k, H, turn):
         by_q = add(cross(b, a), add(turned(J_k, alpha), cross(omega, J_omega)))
         put_column(H, 3, 6 + k, add(scaled(c_m, B_k), add(scaled(2 * c_d, D_omega), scaled(c_k, by_q))))
         put(H[6 + k], 0, scaled(c_m, b))
-        put(H[6 + k], 3, add(scaled(c_m, B_k), scaled(c_d, sub(scaled(2.0, column(Y, n, k)), J_omega))))
+        put(H[6 + k], 3, add(scaled(c_m, B_k), scaled(c_d, sub(scaled(2.0, column(Y, k)), J_omega))))
         put(turn[6 + k], 0, cross(b, a))
     modal_columns(model, work, i, c_d, c_k, H)
     if types.is_stiffened[t]:
@@ -377,19 +381,19 @@ def modal_columns(model, work, i, c_d, c_k, H):
     A = tilde(alpha) + tilde(omega) tilde(omega), because alpha·B'_jk = alpha·B'_kj - 2 alpha·4C_kj.
     """
     types, t, n, u0 = model.body_types, model.bodies.kind[i], model.bodies.n_q[i], model.bodies.u0[i] + 6
-    S, four = block(types, t, S_AB, 9 * n * n), block(types, t, C4, 3 * n * n)
+    S, four = block(types, t, S_AB, n, 9 * n), block(types, t, C4, n, 3 * n)
     q_dot, q_ddot = work.state.u[u0 : u0 + n], work.state.u_dot[u0 : u0 + n]
     omega, alpha = vector(work.state.u[u0 - 3 :]), vector(work.state.u_dot[u0 - 3 :])
     f = scaled(-2.0, add(scaled(c_d, omega), scaled(c_k, alpha)))
     A = scaled_matrix(c_k, matrix_sum(tilde(alpha), product(tilde(omega), tilde(omega))))
     for j in range(n):
-        C_j = slice_of(four, 3 * n, j, 1)  # 4C_kj [a, k]
-        S_j = slice_of(S, 9 * n, j, 1)  # ∫ phi_a,k phi_b,j [ab, k]
+        C_j = matrix_at(four[j], 0, 3, n)  # 4C_kj [a, k]
+        S_j = matrix_at(S[j], 0, 9, n)  # ∫ phi_a,k phi_b,j [ab, k]
         out = H[6 + j, 6:]  # row j from column j: 4C is antisymmetric in k, j, the rest symmetric
         for k in range(n):
-            S_jk = tensor(S_j, n, k)
-            out[k] = dot(f, column(C_j, n, k)) + (dot(A[0], S_jk[0]) + dot(A[1], S_jk[1]) + dot(A[2], S_jk[2]))
-        by_q = add(axial(tensor_sum(S_j, n, q_ddot)), scaled(2.0, turned(trace_less(tensor_sum(S_j, n, q_dot)), omega)))
+            S_jk = tensor(S_j, k)
+            out[k] = dot(f, column(C_j, k)) + (dot(A[0], S_jk[0]) + dot(A[1], S_jk[1]) + dot(A[2], S_jk[2]))
+        by_q = add(axial(tensor_sum(S_j, q_ddot)), scaled(2.0, turned(trace_less(tensor_sum(S_j, q_dot)), omega)))
         add_column(H, 3, 6 + j, scaled(c_k, by_q))
 
 
@@ -397,27 +401,27 @@ def modal_columns(model, work, i, c_d, c_k, H):
 def stiffened_columns(model, work, i, c_d, c_k, H):
     """Add the terms of K_t beyond s(q) and 1C(q), and the derivatives of q_dotᵀ K_t q_dot and q_dotᵀ K_r q_dot."""
     n, q0, u0 = model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
-    K_t = block(model.body_types, model.bodies.kind[i], K_TRANSLATION, 3 * n * n)
-    first_dot = slice_of(work.bodies.K_t_q_dot, 3, q0, n)
-    turn_dot = slice_of(work.bodies.K_r_q_dot, 3, q0, n)
+    K_t = block(model.body_types, model.bodies.kind[i], K_TRANSLATION, n, 3 * n)
+    first_dot = rows_of(work.bodies.K_t_q_dot, 3, q0, n)
+    turn_dot = rows_of(work.bodies.K_r_q_dot, 3, q0, n)
     a, omega = scaled(c_k, work.bodies.a_B[i]), vector(work.state.u[u0 + 3 :])
     q_ddot = work.state.u_dot[u0 + 6 : u0 + 6 + n]
     for j in range(n):
-        K_j = slice_of(K_t, 3 * n, j, 1)  # [a, k]
+        K_j = matrix_at(K_t[j], 0, 3, n)  # [a, k]
         out = H[6 + j, 6:]
         for k in range(n):
-            out[k] += dot(a, column(K_j, n, k))
-        x = column(first_dot, n, j)
-        by_q = add(column_sum(K_j, n, q_ddot), scaled(2.0, cross(omega, x)))
+            out[k] += dot(a, column(K_j, k))
+        x = column(first_dot, j)
+        by_q = add(column_sum(K_j, q_ddot), scaled(2.0, cross(omega, x)))
         add_column(H, 0, 6 + j, add(scaled(2 * c_d, x), scaled(c_k, by_q)))
-        add_column(H, 3, 6 + j, scaled(2 * c_d, column(turn_dot, n, j)))
+        add_column(H, 3, 6 + j, scaled(2 * c_d, column(turn_dot, j)))
 
 
 @loops
 def modal_block(types, t, n, which, factor, H):
     """Add a modal matrix M, K or D, multiplied by `factor`, to the modal block of H."""
     if types.is_diagonal[t, which - MASS]:
-        diagonal = block(types, t, which, n)
+        diagonal = modal_diagonal(types, t, which, n)
         for k in range(n):
             H[6 + k, 6 + k] += factor * diagonal[k]
     else:

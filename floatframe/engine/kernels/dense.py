@@ -1,32 +1,42 @@
-"""Small dense matrices: LU factorisation with partial pivoting, and solves. Row-major, in place."""
+"""Small dense matrices: views of flat arrays, LU factorisation with partial pivoting, solves. Row-major, in place."""
 
 from floatframe.engine.kernels.compiler.compilation import matrix_loops, view
 from floatframe.engine.kernels.vector import add, put, scaled, sub, vector
 
-__all__ = ["add_products", "lu_factor", "lu_solve", "lu_solve_columns", "six_columns", "slice_of"]
+__all__ = ["add_products", "flat", "lu_factor", "lu_solve", "lu_solve_columns", "matrix_at", "rows_of", "six_columns"]
 
 ENOUGH = 0.25  # ratio of a pivot to the largest number of its row at which the search for it ends
 
 
 @view
-def slice_of(A, width, first, n):
-    """Return the numbers of n items of a flat array from item `first` on, `width` numbers for each."""
-    return A[width * first : width * (first + n)]
+def matrix_at(A, start, rows, columns):
+    """Return the matrix (rows, columns) that begins at index `start` of a flat array."""
+    return A[start : start + rows * columns].reshape((rows, columns))
+
+
+@view
+def rows_of(A, rows, first, n):
+    """Return the matrix (rows, n) of n items of a flat array, in which each earlier item takes `rows` numbers."""
+    return matrix_at(A, rows * first, rows, n)
+
+
+@view
+def flat(A):
+    """Return the numbers of a matrix as a vector, row after row."""
+    return A.reshape(A.size)
 
 
 @matrix_loops
 def add_products(A, x, out):
-    """Add Σ_k A[k, j] x_k to out[j], with A stored flat in rows as long as out; four rows at once."""
+    """Add Σ_k A[k, j] x_k to out[j]; four rows at once."""
     n, width = x.shape[0], out.shape[0]
     for k in range(0, n - 3, 4):
-        o = k * width
-        r0, r1 = A[o : o + width], A[o + width : o + 2 * width]
-        r2, r3 = A[o + 2 * width : o + 3 * width], A[o + 3 * width : o + 4 * width]
+        r0, r1, r2, r3 = A[k], A[k + 1], A[k + 2], A[k + 3]
         x0, x1, x2, x3 = x[k], x[k + 1], x[k + 2], x[k + 3]
         for j in range(width):
             out[j] += (r0[j] * x0 + r1[j] * x1) + (r2[j] * x2 + r3[j] * x3)
     for k in range(n - n % 4, n):
-        row, y = A[k * width : (k + 1) * width], x[k]
+        row, y = A[k], x[k]
         for j in range(width):
             out[j] += row[j] * y
 

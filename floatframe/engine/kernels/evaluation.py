@@ -6,7 +6,7 @@ Described in `floatframe.model.forces.loads`, `floatframe.integrators.ida`.
 from floatframe.engine.kernels.body import body_forces, body_tangent, newton_block
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.connection import connection_derivatives, connection_rows
-from floatframe.engine.kernels.dense import slice_of
+from floatframe.engine.kernels.dense import rows_of
 from floatframe.engine.kernels.joints.deformed_line import slide_marker
 from floatframe.engine.kernels.marker import (
     acceleration_columns,
@@ -128,12 +128,12 @@ def linearize(model, work, c_m, c_d, c_k):
         for e in range(model.bodies.end0[i], model.bodies.end0[i + 1]):
             m = model.bodies.ends[e]
             o = model.markers.x0[m]
-            column = slice_of(work.solver.J_column, 6, o, n).reshape((6, n))
-            row = slice_of(work.solver.J_row, 12, o, n).reshape((12, n))
+            column = rows_of(work.solver.J_column, 6, o, n)
+            row = rows_of(work.solver.J_row, 12, o, n)
             marker_columns(model, work, m, rate, turning, column, row)
             if model.markers.accelerated[m] >= 0:
                 o = model.markers.a0[m]
-                row_a = slice_of(work.solver.J_a, 6, o, n).reshape((6, n))
+                row_a = rows_of(work.solver.J_a, 6, o, n)
                 acceleration_columns(model, work, m, c_m, c_d, c_k, turning, row_a)
     for c in range(model.connections.size.shape[0]):
         connection_derivatives(model, work, c, c_k)

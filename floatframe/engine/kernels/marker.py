@@ -10,12 +10,13 @@ th, and nu = T' th_dot, all in body axes,
     wrench (f, m in body axes)  ->  f;  rho × f + m;  Psi_t(q)ᵀ f + (T' Psi_r(q))ᵀ m
 """
 
-from floatframe.engine.kernels.compiler.compilation import loops, small
-from floatframe.engine.kernels.dense import add_products
+from floatframe.engine.kernels.compiler.compilation import loops, small, view
+from floatframe.engine.kernels.dense import add_products, flat, matrix_at
 from floatframe.engine.kernels.rotation import exp_matrix, left_jacobian, left_jacobian_derivative
 from floatframe.engine.kernels.vector import (
     add,
     add_column,
+    copy,
     cross,
     dot,
     matrix,
@@ -34,8 +35,21 @@ from floatframe.engine.kernels.vector import (
 
 __all__ = [
     "acceleration_columns", "bent_bias", "marker_acceleration", "marker_acceleration_bias", "marker_columns",
-    "marker_motion", "marker_stiffness", "pose_on_body", "wrench_to_body",
+    "marker_motion", "marker_stiffness", "pose_on_body", "shapes_of", "wrench_to_body",
 ]  # fmt: skip
+
+
+@view
+def shapes_of(model, psi, m):
+    """Return the shapes of marker m, (6, n); psi: of all markers, undeformed or Psi(q)."""
+    return matrix_at(psi, model.markers.psi0[m], 6, model.bodies.n_q[model.markers.body[m]])
+
+
+@view
+def bending_of(model, m):
+    """Return the matrices K_P of a stiffened body at marker m, (n, 6 n): row l is [6, k]."""
+    n = model.bodies.n_q[model.markers.body[m]]
+    return matrix_at(model.markers.bend, model.markers.bend0[m], n, 6 * n)
 
 
 @loops
@@ -79,26 +93,27 @@ def pose_on_body(model, work, m):
 @loops
 def elastic_motion(model, work, m, i):
     """Add the elastic displacement to rho, and write the elastic rotation, its rate and the left Jacobian."""
-    n, q0, u0, o = model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i], model.markers.psi0[m]
+    n, q0, u0 = model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i] + 6
+    q, q_dot = work.state.q[q0 : q0 + n], work.state.u[u0 : u0 + n]
+    own, psi = shapes_of(model, model.markers.psi, m), shapes_of(model, work.markers.psi, m)
     is_bent = model.markers.bend0[m] >= 0
     if is_bent:
-        bent_shapes(model, m, n, work.state.q[q0 : q0 + n], 1.0, work.markers.psi[o : o + 6 * n])
+        bent_shapes(model, m, q, 1.0, psi)
     for a in range(3):
         d, d_dot, th, th_dot = 0.0, 0.0, 0.0, 0.0
-        t = work.markers.psi[o + a * n : o + (a + 1) * n]
-        r = work.markers.psi[o + (a + 3) * n : o + (a + 4) * n]
+        t, r = psi[a], psi[3 + a]
         if is_bent:  # Psi q - 1/2 qᵀ K_P q
             for k in range(n):
-                d += 0.5 * (model.markers.psi[o + a * n + k] + t[k]) * work.state.q[q0 + k]
-                th += 0.5 * (model.markers.psi[o + (a + 3) * n + k] + r[k]) * work.state.q[q0 + k]
-                d_dot += t[k] * work.state.u[u0 + 6 + k]
-                th_dot += r[k] * work.state.u[u0 + 6 + k]
+                d += 0.5 * (own[a, k] + t[k]) * q[k]
+                th += 0.5 * (own[3 + a, k] + r[k]) * q[k]
+                d_dot += t[k] * q_dot[k]
+                th_dot += r[k] * q_dot[k]
         else:
             for k in range(n):
-                d += t[k] * work.state.q[q0 + k]
-                th += r[k] * work.state.q[q0 + k]
-                d_dot += t[k] * work.state.u[u0 + 6 + k]
-                th_dot += r[k] * work.state.u[u0 + 6 + k]
+                d += t[k] * q[k]
+                th += r[k] * q[k]
+                d_dot += t[k] * q_dot[k]
+                th_dot += r[k] * q_dot[k]
         work.markers.rho[m, a] += d
         work.markers.rho_dot[m, a] = d_dot
         work.markers.angle[m, a] = th
@@ -108,34 +123,32 @@ def elastic_motion(model, work, m, i):
 
 
 @loops
-def bent_shapes(model, m, n, q, factor, psi):
-    """Write Psi - factor K_P q of a marker on a flexible body, [6, k]; factor 1 gives the shapes Psi(q)."""
-    o, first, scale = model.markers.psi0[m], model.markers.bend0[m], 1.0 / factor
-    own = model.markers.psi[o : o + 6 * n]
-    if first < 0:
-        for k in range(6 * n):
-            psi[k] = own[k]
+def bent_shapes(model, m, q, factor, psi):
+    """Write Psi - factor K_P q of a marker on a flexible body, (6, n); factor 1 gives the shapes Psi(q)."""
+    own, out, scale = flat(shapes_of(model, model.markers.psi, m)), flat(psi), 1.0 / factor
+    if model.markers.bend0[m] < 0:
+        copy(own, out)
         return
-    for k in range(6 * n):
-        psi[k] = -scale * own[k]
-    add_products(model.markers.bend[first : first + 6 * n * n], q, psi[: 6 * n])
-    for k in range(6 * n):
-        psi[k] *= -factor
+    for k in range(out.shape[0]):
+        out[k] = -scale * own[k]
+    add_products(bending_of(model, m), q, out)
+    for k in range(out.shape[0]):
+        out[k] *= -factor
 
 
 @loops
 def bent_rate(model, work, m, i, out):
-    """Write the matrix K_P q_dot, (6, n_q), into `out`, row after row; it is minus the rate of Psi(q)."""
+    """Write the matrix K_P q_dot into out, (6, n); it is minus the rate of Psi(q)."""
     n, u0 = model.bodies.n_q[i], model.bodies.u0[i]
-    bent_by(model, m, n, work.state.u[u0 + 6 : u0 + 6 + n], out)
+    bent_by(model, m, work.state.u[u0 + 6 : u0 + 6 + n], out)
 
 
 @loops
-def bent_by(model, m, n, factors, out):
-    """Write Σ_l K_P,l factors_l [6, k] into out, (6 n_q,)."""
-    first = model.markers.bend0[m]
-    out[: 6 * n] = 0.0
-    add_products(model.markers.bend[first : first + 6 * n * n], factors, out)
+def bent_by(model, m, factors, out):
+    """Write Σ_l K_P,l factors_l into out, (6, n)."""
+    products = flat(out)
+    products[:] = 0.0
+    add_products(bending_of(model, m), factors, products)
 
 
 @loops
@@ -147,9 +160,9 @@ def bent_bias(model, work, m, i):
     if model.markers.bend0[m] < 0:
         return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     n, u0 = model.bodies.n_q[i], model.bodies.u0[i] + 6
-    bend_dot = work.markers.bend_dot[: 6 * n]
+    bend_dot = matrix_at(work.markers.bend_dot, 0, 6, n)
     bent_rate(model, work, m, i, bend_dot)
-    d, th = shape_sum(bend_dot, n, work.state.u[u0 : u0 + n])
+    d, th = shape_sum(bend_dot, work.state.u[u0 : u0 + n])
     return scaled(-1.0, d), scaled(-1.0, th)
 
 
@@ -184,10 +197,10 @@ def marker_acceleration(model, work, m, out):
     if i < 0:
         return
     R, u_dot = work.state.R[i], work.state.u_dot[model.bodies.u0[i] :]
-    turn, o, n = vector(u_dot[3:]), model.markers.psi0[m], model.bodies.n_q[i]
+    turn = vector(u_dot[3:])
     move = cross(turn, vector(work.markers.rho[m]))
-    if o >= 0:
-        d, th = shape_sum(work.markers.psi[o : o + 6 * n], n, u_dot[6 : 6 + n])
+    if model.markers.psi0[m] >= 0:
+        d, th = shape_sum(shapes_of(model, work.markers.psi, m), u_dot[6:])
         move, turn = add(move, d), add(turn, turned(work.markers.T_left[m], th))
     put_sum(out, 0, add(vector(u_dot), turned(R, move)))
     put_sum(out, 3, turned(R, turn))
@@ -220,22 +233,21 @@ def acceleration_columns(model, work, m, c_m, c_d, c_k, turning, row):
         by_spin = add(cross(e, add(cross(omega, rho), scaled(2.0, rho_dot))), cross(omega, cross(e, rho)))
         put_column(row, 0, 3 + b, add(add(scaled(c_m, cross(e, rho)), scaled(c_d, by_spin)), cross(t, a)))
         put_column(row, 3, 3 + b, add(add(scaled(c_m, e), scaled(c_d, cross(e, nu))), cross(t, alpha)))
-    o = model.markers.psi0[m]
-    if o < 0:
+    if model.markers.psi0[m] < 0:
         return
-    psi, T, is_bent = work.markers.psi[o : o + 6 * n], work.markers.T_left[m], model.markers.bend0[m] >= 0
-    bend_dot, bend_ddot = work.markers.bend_dot[: 6 * n], work.markers.bend_ddot[: 6 * n]
+    psi, T, is_bent = shapes_of(model, work.markers.psi, m), work.markers.T_left[m], model.markers.bend0[m] >= 0
+    bend_dot, bend_ddot = matrix_at(work.markers.bend_dot, 0, 6, n), matrix_at(work.markers.bend_ddot, 0, 6, n)
     if is_bent:
         bent_rate(model, work, m, i, bend_dot)
-        bent_by(model, m, n, work.state.u_dot[u0 + 6 : u0 + 6 + n], bend_ddot)
+        bent_by(model, m, work.state.u_dot[u0 + 6 : u0 + 6 + n], bend_ddot)
     for k in range(n):
-        d, th = shape(psi, n, k)
+        d, th = shape(psi, k)
         turn = turned(T, th)
         by_rate = scaled(2.0, cross(omega, d))
         by_place = add(cross(omega_dot, d), cross(omega, cross(omega, d)))
         if is_bent:
-            d_dot, _ = shape(bend_dot, n, k)
-            d_ddot, _ = shape(bend_ddot, n, k)
+            d_dot, _ = shape(bend_dot, k)
+            d_ddot, _ = shape(bend_ddot, k)
             by_rate = sub(by_rate, scaled(2.0, d_dot))
             by_place = sub(by_place, add(d_ddot, scaled(2.0, cross(omega, d_dot))))
         put_column(row, 0, 6 + k, add(add(scaled(c_m, d), scaled(c_d, by_rate)), scaled(c_k, by_place)))
@@ -243,17 +255,17 @@ def acceleration_columns(model, work, m, c_m, c_d, c_k, turning, row):
 
 
 @small
-def shape(psi, n, k):
-    """Return displacement and rotation in column k of the shapes [6, n]."""
-    return (psi[k], psi[n + k], psi[2 * n + k]), (psi[3 * n + k], psi[4 * n + k], psi[5 * n + k])
+def shape(psi, k):
+    """Return displacement and rotation in column k of the shapes (6, n)."""
+    return (psi[0, k], psi[1, k], psi[2, k]), (psi[3, k], psi[4, k], psi[5, k])
 
 
 @loops
-def shape_sum(psi, n, factors):
-    """Return the sum of displacement and rotation over all shapes, (6 n,), weighted by `factors`."""
+def shape_sum(psi, factors):
+    """Return the sum of displacement and rotation over all shapes, (6, n), weighted by `factors`."""
     d, th = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    for k in range(n):
-        d_k, th_k = shape(psi, n, k)
+    for k in range(psi.shape[1]):
+        d_k, th_k = shape(psi, k)
         d, th = add(d, scaled(factors[k], d_k)), add(th, scaled(factors[k], th_k))
     return d, th
 
@@ -276,12 +288,11 @@ def wrench_to_body(model, work, m):
     tau = add(cross(vector(work.markers.rho[m]), f), t)
     put_sum(residual, u0, scaled(-1.0, f))
     put_sum(residual, u0 + 3, scaled(-1.0, tau))
-    o = model.markers.psi0[m]
-    if o >= 0:
-        psi = work.markers.psi[o : o + 6 * n]
+    if model.markers.psi0[m] >= 0:
+        psi = shapes_of(model, work.markers.psi, m)
         s = turned_back(work.markers.T_left[m], t)
         for k in range(n):
-            d, th = shape(psi, n, k)
+            d, th = shape(psi, k)
             residual[u0 + 6 + k] -= dot(d, f) + dot(th, s)
 
 
@@ -309,13 +320,12 @@ def marker_columns(model, work, m, rate, turning, column, row):
         put_column(row, 3, 3 + b, t)
         put_column(row, 6, 3 + b, add(scaled(rate, arm), cross(t, arm_dot)))
         put_column(row, 9, 3 + b, add(scaled(rate, e), cross(t, spin)))
-    o = model.markers.psi0[m]
-    if o < 0:
+    if model.markers.psi0[m] < 0:
         return
     slope = left_jacobian_derivative(vector(work.markers.angle[m]), vector(work.markers.angle_dot[m]), 1.0)
-    psi, T = work.markers.psi[o : o + 6 * n], work.markers.T_left[m]
+    psi, T = shapes_of(model, work.markers.psi, m), work.markers.T_left[m]
     for k in range(n):
-        d, th = shape(psi, n, k)
+        d, th = shape(psi, k)
         turn = turned(T, th)
         put_column(column, 0, 6 + k, d)
         put_column(column, 3, 6 + k, turn)
@@ -324,10 +334,10 @@ def marker_columns(model, work, m, rate, turning, column, row):
         put_column(row, 6, 6 + k, add(cross(omega, d), scaled(rate, d)))
         put_column(row, 9, 6 + k, add(turned(slope, th), scaled(rate, turn)))
     if model.markers.bend0[m] >= 0:  # d(Psi(q) q_dot)/dq = -K_P q_dot
-        bend_dot = work.markers.bend_dot[: 6 * n]
+        bend_dot = matrix_at(work.markers.bend_dot, 0, 6, n)
         bent_rate(model, work, m, i, bend_dot)
         for k in range(n):
-            d, th = shape(bend_dot, n, k)
+            d, th = shape(bend_dot, k)
             add_column(row, 6, 6 + k, scaled(-1.0, d))
             add_column(row, 9, 6 + k, scaled(-1.0, turned(T, th)))
 
@@ -348,21 +358,19 @@ def marker_stiffness(model, work, m, c_k, H, turn):
             f_turned = cross(f, unit(b))
             add_column(turn, 0, b, scaled(-1.0, f_turned))
             add_column(turn, 3, b, scaled(-1.0, add(cross(rho, f_turned), cross(t, unit(b)))))
-    o = model.markers.psi0[m]
-    if o < 0:
+    if model.markers.psi0[m] < 0:
         return
-    psi, T = work.markers.psi[o : o + 6 * n], work.markers.T_left[m]
+    psi, T = shapes_of(model, work.markers.psi, m), work.markers.T_left[m]
     if model.markers.bend0[m] >= 0:  # h = Psi(q)ᵀ [f; Tᵀ m], dPsi(q) = -K_P dq
-        s, first = turned_back(T, t), model.markers.bend0[m]
+        s, bending = turned_back(T, t), bending_of(model, m)
         for j in range(n):
-            bend = model.markers.bend[first + 6 * n * j : first + 6 * n * (j + 1)]
-            out = H[6 + j, 6:]
+            bend, out = matrix_at(bending[j], 0, 6, n), H[6 + j, 6:]
             for k in range(n):
-                d, th = shape(bend, n, k)
+                d, th = shape(bend, k)
                 out[k] += c_k * (dot(f, d) + dot(s, th))
     slope = left_jacobian_derivative(vector(work.markers.angle[m]), t, -1.0)
     for j in range(n):
-        d, th = shape(psi, n, j)
+        d, th = shape(psi, j)
         turned_by = turned(T, th)  # rotation of the marker in the body
         add_column(H, 3, 6 + j, scaled(-c_k, cross(d, f)))  # tau: drho × f
         df, ds = (0.0, 0.0, 0.0), turned(slope, th)  # h: Psi_rᵀ d(T m)
@@ -377,5 +385,5 @@ def marker_stiffness(model, work, m, c_k, H, turn):
             for a in range(3):
                 turn[6 + j, a] -= row[a]
         for k in range(n):
-            d, th = shape(psi, n, k)
+            d, th = shape(psi, k)
             H[6 + k, 6 + j] -= c_k * (dot(d, df) + dot(th, ds))

@@ -16,7 +16,7 @@ from floatframe.engine.kernels.connections.connection import (
     constraint_rates,
     write_velocity_gaps,
 )
-from floatframe.engine.kernels.dense import lu_factor, lu_solve, lu_solve_columns, six_columns, slice_of
+from floatframe.engine.kernels.dense import lu_factor, lu_solve, lu_solve_columns, rows_of, six_columns
 from floatframe.engine.kernels.evaluation import linearize
 from floatframe.engine.kernels.model import STIFFNESS
 from floatframe.engine.kernels.vector import add, copy, dot, put, put_sum, scaled, sub, turned, turned_back, vector
@@ -58,8 +58,8 @@ def factorize_tangents(model, work):
             return i
         for e in range(model.bodies.end0[i], model.bodies.end0[i + 1]):
             o = model.markers.x0[model.bodies.ends[e]]
-            column = slice_of(work.solver.J_column, 6, o, n).reshape((6, n))
-            X = slice_of(work.solver.X, 6, o, n).reshape((n, 6))
+            column = rows_of(work.solver.J_column, 6, o, n)
+            X = work.solver.X[o : o + n]
             for r in range(n):
                 for k in range(6):
                     X[r, k] = column[k, r]
@@ -68,14 +68,14 @@ def factorize_tangents(model, work):
         row_marker, column_marker = model.elimination.pair_row[p], model.elimination.pair_column[p]
         n = 6 + model.bodies.n_q[model.markers.body[row_marker]]
         o = model.markers.x0[row_marker]
-        row = slice_of(work.solver.J_row, 12, o, n).reshape((12, n))
+        row = rows_of(work.solver.J_row, 12, o, n)
         o = model.markers.x0[column_marker]
-        X = slice_of(work.solver.X, 6, o, n).reshape((n, 6))
+        X = work.solver.X[o : o + n]
         n_motion = 12 if model.connections.has_rates[model.markers.connection[row_marker]] else 6
         six_columns(row, X, work.solver.Z[p, :n_motion])
         if model.markers.accelerated[row_marker] >= 0:
             o = model.markers.a0[row_marker]
-            six_columns(slice_of(work.solver.J_a, 6, o, n).reshape((6, n)), X, work.solver.Z_a[p])
+            six_columns(rows_of(work.solver.J_a, 6, o, n), X, work.solver.Z_a[p])
     return -1
 
 
@@ -232,7 +232,7 @@ def take_accelerated(model, work, m, n, y, mu):
     """Subtract from mu the effect of the body correction y on the rows of marker m through its acceleration."""
     c, o, motion = model.markers.connection[m], model.markers.a0[m], work.solver.motion
     R, P_a = work.state.R[model.markers.body[m]], work.connections.P_a[model.markers.accelerated[m]]
-    J_a = slice_of(work.solver.J_a, 6, o, n).reshape((6, n))
+    J_a = rows_of(work.solver.J_a, 6, o, n)
     for r in range(6):
         total = 0.0
         for k in range(n):
@@ -313,7 +313,7 @@ def take_motions(model, work):
             c = markers.connection[m]
             o, w0 = markers.x0[m], connections.w0[c]
             n_motion = 12 if connections.has_rates[c] else 6
-            row = slice_of(solver.J_row, 12, o, n).reshape((12, n))
+            row = rows_of(solver.J_row, 12, o, n)
             for part in range(0, n_motion, 3):
                 x = three_products(row[part], row[part + 1], row[part + 2], y[u0 : u0 + n])
                 put(motion, part, turned(R, x))
@@ -374,7 +374,7 @@ def add_wrenches(model, work):
                 force = scaled(sign, turned_back(R, mu[w0 + markers.force[m] :]))
             if markers.moment[m] >= 0:
                 moment = scaled(sign, turned_back(R, mu[w0 + markers.moment[m] :]))
-            X = slice_of(solver.X, 6, o, n).reshape((n, 6))
+            X = solver.X[o : o + n]
             for r in range(n):
                 y[u0 + r] += dot(vector(X[r]), force) + dot(vector(X[r, 3:]), moment)
 

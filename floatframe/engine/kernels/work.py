@@ -268,7 +268,7 @@ class Solver(NamedTuple):
     pivot: IntArray = integer(n_u)
     J_row: Array = real(12 * n_x)  #: derivative of the marker motion (12) by body unknowns, from index 12 x0
     J_column: Array = real(6 * n_x)  #: derivative of the marker motion (6) by body velocities, from index 6 x0
-    X: Array = real(6 * n_x)  #: body motion by a unit wrench, H⁻¹ J_columnᵀ [unknown, 6], from index 6 x0
+    X: Array = real(n_x, 6)  #: body motion by a unit wrench, H⁻¹ J_columnᵀ, from row x0
     Z: Array = real(n_pairs, 12, 6)  #: product J_row X for each pair of ends
     J_a: Array = real(6 * n_a)  #: derivative of marker accelerations (6) by body unknowns, times c_k, from index 6 a0
     Z_a: Array = real(Size("accelerated pairs"), 6, 6)  #: product J_a X for each pair whose row marker is accelerated

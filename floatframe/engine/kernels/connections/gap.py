@@ -22,7 +22,7 @@ from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.contact import contact_gap
 from floatframe.engine.kernels.connections.element_law import law_values, n_results
 from floatframe.engine.kernels.joints.relative_motion import distance, relative_velocity
-from floatframe.engine.kernels.marker import marker_acceleration, marker_motion, shape
+from floatframe.engine.kernels.marker import marker_acceleration, marker_motion, shape, shapes_of
 from floatframe.engine.kernels.model import ELEMENT, MASS, STIFFNESS
 from floatframe.engine.kernels.rotation import exp_matrix
 from floatframe.engine.kernels.vector import (
@@ -313,12 +313,10 @@ def modal_mobility(model, work, g, stiffness):
         for k in range(n):
             Q = 0.0
             for j in range(m, last):
-                o = model.markers.psi0[j]
-                if model.markers.body[j] == i and o >= 0:
+                if model.markers.body[j] == i and model.markers.psi0[j] >= 0:
                     f, moment = wrench_in_body(work, i, j)
-                    psi, s = work.markers.psi[o : o + 6 * n], turned_back(work.markers.T_left[j], moment)
-                    d, th = shape(psi, n, k)
-                    Q += dot(d, f) + dot(th, s)
+                    d, th = shape(shapes_of(model, work.markers.psi, j), k)
+                    Q += dot(d, f) + dot(th, turned_back(work.markers.T_left[j], moment))
             types = model.body_types
             M, K = modal_number(types, t, n, MASS, k), modal_number(types, t, n, STIFFNESS, k)
             if Q != 0.0 and M > 0.0:

@@ -20,7 +20,7 @@ from floatframe.engine.kernels.connections.coordinate import (
     indices_of,
     rows_along_coordinates,
 )
-from floatframe.engine.kernels.dense import slice_of
+from floatframe.engine.kernels.dense import matrix_at
 from floatframe.engine.kernels.time_function import time_function
 from floatframe.model.functions.expressions import (
     ABS,
@@ -267,16 +267,24 @@ def are_finite(values, n):
     return True
 
 
+@view
+def gradients_of(model, work, c):
+    """Return the derivatives of all outputs of user force c by all inputs, (n_out, n_in)."""
+    _, n_in, n_out = counts_of(model, c)
+    return matrix_at(work.users.gradients, 0, n_out, n_in)
+
+
 @inner
 def user_gradients(model, work, c):
-    """Write the derivatives of all outputs by all inputs, row by row."""
+    """Write the derivatives of all outputs by all inputs."""
     i, first, _ = indices_of(model, c)
     n, n_in, n_out = counts_of(model, c)
+    gradients = gradients_of(model, work, c)
     user_values(model, work, c)
     if model.elements.address[i] == 0:
         for j in range(n_out):
-            f, gradient = model.elements.tape0[i] + j, slice_of(work.users.gradients, n_in, j, 1)
-            tape_gradient(model.tapes, model.functions, f, work.users.inputs, work.tapes, gradient)
+            f = model.elements.tape0[i] + j
+            tape_gradient(model.tapes, model.functions, f, work.users.inputs, work.tapes, gradients[j])
         return
     for k in range(1, n_in):  # derivatives by time are not used
         here = work.users.inputs[k]
@@ -292,12 +300,11 @@ def user_gradients(model, work, c):
         call_user_function(model.elements.address[i], work.users.inputs, work.users.trial)
         work.users.inputs[k] = below
         for j in range(n_out):
-            work.users.gradients[j * n_in + k] = work.users.trial[j]
+            gradients[j, k] = work.users.trial[j]
         call_user_function(model.elements.address[i], work.users.inputs, work.users.trial)
         work.users.inputs[k] = here
         for j in range(n_out):
-            change = work.users.gradients[j * n_in + k] - work.users.trial[j]
-            work.users.gradients[j * n_in + k] = change / (above - below)
+            gradients[j, k] = (gradients[j, k] - work.users.trial[j]) / (above - below)
 
 
 @inner
@@ -339,7 +346,8 @@ def user_force_derivatives(model, work, c, c_k):
     V = work.connections.V[c]
     derivatives_along_coordinates(model, work, c, c_k)
     user_gradients(model, work, c)
-    n, n_in, n_out = counts_of(model, c)
+    n, _, n_out = counts_of(model, c)
+    gradients = gradients_of(model, work, c)
     n_forces, n_states = model.elements.n_forces[i], model.elements.n_states[i]
     core = model.elements.core[i] - model.connections.w0[c]
     for s in range(n_states):
@@ -347,7 +355,7 @@ def user_force_derivatives(model, work, c, c_k):
     for j in range(n_out):
         r = core + j if j < n_forces else core + n_forces + 3 * (j - n_forces) + 1
         V[r, r] = 1.0
-        by_x, by_v, by_z = input_parts(slice_of(work.users.gradients, n_in, j, 1), n)
+        by_x, by_v, by_z = input_parts(gradients[j], n)
         for p in range(first, last):
             coordinate_gradient(model, work, p, r, -c_k * by_x[p - first], -c_k * by_v[p - first])
         for s in range(n_states):

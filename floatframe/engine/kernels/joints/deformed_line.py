@@ -24,10 +24,11 @@ Described in `floatframe.model.joints.sliding`.
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.joints.held_rows import ZERO, axis_rates, product_rates
 from floatframe.engine.kernels.joints.relative_motion import direction, distance, prescribed, relative_velocity
-from floatframe.engine.kernels.marker import bent_bias, pose_on_body, shape
+from floatframe.engine.kernels.marker import bent_bias, pose_on_body, shape, shapes_of
 from floatframe.engine.kernels.rotation import left_jacobian, left_jacobian_derivative
 from floatframe.engine.kernels.vector import (
     add,
+    add_column,
     cross,
     dot,
     norm,
@@ -190,11 +191,9 @@ def slide_marker(model, work, k):
     put(markers.angle_dot[m], 0, angle_dot)
     put_matrix(markers.T_left[m], T)
     put(markers.spin[m], 0, turned(T, angle_dot))
-    n, psi, psi0 = model.bodies.n_q[i], markers.psi, model.markers.psi0
-    own = psi[psi0[m] : psi0[m] + 6 * n]
-    for q in range(6 * n):
-        own[q] = 0.0
-    add_shapes(model, k, s, psi[psi0[m_1] :], psi[psi0[m_2] :], n, 1.0, own)
+    own = shapes_of(model, markers.psi, m)
+    own[:, :] = 0.0
+    add_shapes(model, k, s, shapes_of(model, markers.psi, m_1), shapes_of(model, markers.psi, m_2), 1.0, own)
     pose_on_body(model, work, m)
     # the line in ground axes
     R = work.state.R[i]
@@ -228,20 +227,19 @@ def turning_change(T, th, s_dot, th_t, th_s, th_st, th_ss):
 
 
 @inner
-def add_shapes(model, k, s, first, second, n, factor, out):
-    """Add the derivatives by q, [6, n], of displacement and rotation at s, interpolated from the nearest stations."""
+def add_shapes(model, k, s, first, second, factor, out):
+    """Add the derivatives by q, (6, n), of displacement and rotation at s, interpolated from the nearest stations."""
     e, stations = vector(model.lines.axis[k]), model.stations
     j, h = piece(model.lines, stations, k, s)
     value, slopes = weights(stations, j, h, s, 0), weights(stations, j, h, s, 1)
     l_2, _ = linear_weight(stations, j, h, s)
-    for q in range(n):
-        d_1, th_1 = shape(first, n, q)
-        d_2, th_2 = shape(second, n, q)
+    for q in range(out.shape[1]):
+        d_1, th_1 = shape(first, q)
+        d_2, th_2 = shape(second, q)
         d = combined(e, value, d_1, th_1, d_2, th_2)
         th = add(cross(e, combined(e, slopes, d_1, th_1, d_2, th_2)), scaled(dot(e, mean(l_2, th_1, th_2)), e))
-        for a in range(3):
-            out[a * n + q] += factor * d[a]
-            out[(3 + a) * n + q] += factor * th[a]
+        add_column(out, 0, q, scaled(factor, d))
+        add_column(out, 3, q, scaled(factor, th))
 
 
 @inner

@@ -30,7 +30,7 @@ from floatframe.engine.kernels.body import (
     trace_less,
 )
 from floatframe.engine.kernels.compiler.compilation import inner, loops
-from floatframe.engine.kernels.dense import slice_of
+from floatframe.engine.kernels.dense import matrix_at, rows_of
 from floatframe.engine.kernels.model import C2, C3, DAMPING, K_TRANSLATION, MASS, S_AB, STIFFNESS
 from floatframe.engine.kernels.rotation import matrix_of_euler_parameters
 from floatframe.engine.kernels.vector import (
@@ -76,32 +76,33 @@ def cayley(theta):
 
 @loops
 def center(types, t, n, q, C):
-    """Return the centre of mass s(q)/m in the body; write its derivative by q, 1C(q)/m, into the first 3 n of C."""
-    s, f = shape_moments(types, t, n, q, C[: 3 * n]), 1.0 / types.mass[t]
-    for k in range(3 * n):
-        C[k] *= f
+    """Return the centre of mass s(q)/m in the body; write its derivative by q, 1C(q)/m, into C, (3, n)."""
+    s, f = shape_moments(types, t, n, q, C), 1.0 / types.mass[t]
+    for a in range(3):
+        for k in range(n):
+            C[a, k] *= f
     return scaled(f, s)
 
 
 @loops
 def momenta(types, step, t, n, q, omega, q_dot, Y):
     """Return the angular momentum Pi, and write the modal momenta Y, (n,)."""
-    V, C = step.V[: 9 * n], step.C[: 3 * n]
+    V, C = matrix_at(step.V, 0, 9, n), matrix_at(step.C, 0, 3, n)
     s = shape_moments(types, t, n, q, C)
-    a = scaled(1.0 / types.mass[t], add(cross(omega, s), column_sum(C, n, q_dot)))
+    a = scaled(1.0 / types.mass[t], add(cross(omega, s), column_sum(C, q_dot)))
     Pi = sub(turned(types.J0[t], omega), cross(s, a))
     if n == 0:
         return Pi
     constant_products(types, t, S_AB, q, V)
     Y[:] = 0.0
     modal_term(types, t, n, MASS, 1.0, q_dot, Y)
-    second = block(types, t, C2, 3 * n)
+    second = block(types, t, C2, 3, n)
     for k in range(n):
-        B = coupling(second, V, n, k)
-        Y[k] += dot(B, omega) - dot(column(C, n, k), a)
+        B = coupling(second, V, k)
+        Y[k] += dot(B, omega) - dot(column(C, k), a)
         Pi = add(Pi, scaled(q_dot[k], B))
-    third = tensor_sum(block(types, t, C3, 9 * n), n, q)
-    G = matrix_sum(third, scaled_matrix(0.5, trace_less(tensor_sum(V, n, q))))  # J = J0 + G + Gᵀ
+    third = tensor_sum(block(types, t, C3, 9, n), q)
+    G = matrix_sum(third, scaled_matrix(0.5, trace_less(tensor_sum(V, q))))  # J = J0 + G + Gᵀ
     return add(Pi, add(turned(G, omega), turned_back(G, omega)))
 
 
@@ -117,17 +118,18 @@ class ModalMotion(NamedTuple):
 def inertia_force(types, discrete, step, t, n, start, end, q_mean, C_mean, out):
     """Write N_k, (n,), the modal inertia force 1/2 w_0ᵀ M_c,k w_1 between two motions."""
     (q_0, omega_0, rate_0), (q_1, omega_1, rate_1) = start, end
-    m, V, W, C = types.mass[t], step.V[: 9 * n], step.W[: 9 * n], step.C[: 3 * n]
+    m, C = types.mass[t], matrix_at(step.C, 0, 3, n)
+    V, W = matrix_at(step.V, 0, 9, n), matrix_at(step.W, 0, 9, n)
     constant_products(types, t, S_AB, q_mean, V)
-    third = block(types, t, C3, 9 * n)
+    third = block(types, t, C3, 9, n)
     for k in range(n):
-        D = inertia_rate(third, V, n, k)
+        D = inertia_rate(third, V, k)
         out[k] = dot(omega_0, add(turned(D, omega_1), turned_back(D, omega_1)))
     s_0 = center(types, t, n, q_0, C)
-    a_rate_0, a_rate_1 = column_sum(C, n, rate_0), column_sum(C, n, rate_1)
+    a_rate_0, a_rate_1 = column_sum(C, rate_0), column_sum(C, rate_1)
     s_mean = scaled(0.5, add(s_0, center(types, t, n, q_1, C)))
-    a_rate_0 = scaled(0.5, add(a_rate_0, column_sum(C, n, rate_0)))
-    a_rate_1 = scaled(0.5, add(a_rate_1, column_sum(C, n, rate_1)))
+    a_rate_0 = scaled(0.5, add(a_rate_0, column_sum(C, rate_0)))
+    a_rate_1 = scaled(0.5, add(a_rate_1, column_sum(C, rate_1)))
     for turn in range(2):
         omega, other = (omega_0, omega_1) if turn == 0 else (omega_1, omega_0)
         other_rate = rate_1 if turn == 0 else rate_0
@@ -135,11 +137,11 @@ def inertia_force(types, discrete, step, t, n, start, end, q_mean, C_mean, out):
         constant_products(discrete, t, TURNED_PRODUCTS, other_rate, W)
         across = scaled(m, cross(a, other))
         for k in range(n):
-            out[k] += dot(omega, axial(tensor(W, n, k))) - dot(column(C_mean, n, k), across)
+            out[k] += dot(omega, axial(tensor(W, k))) - dot(column(C_mean, k), across)
         if types.is_stiffened[t]:
             constant_products(types, t, K_TRANSLATION, other_rate, C)
             for k in range(n):
-                out[k] -= dot(column(C, n, k), a)
+                out[k] -= dot(column(C, k), a)
     for k in range(n):
         out[k] *= 0.5
 
@@ -156,10 +158,11 @@ def begin_bodies(model, step, memory):
         q, q_dot, omega = memory.q[q0 : q0 + n], memory.u[u0 + 6 : u0 + 6 + n], vector(memory.u[u0 + 3 :])
         for k in range(n):
             step.q_0[q0 + k] = q[k]
-        s = center(model.body_types, t, n, q, step.C)
+        C = matrix_at(step.C, 0, 3, n)
+        s = center(model.body_types, t, n, q, C)
         put(step.s_0[i], 0, s)
         put(step.c_0[i], 0, add(vector(memory.r[i]), turned(R, s)))
-        a = add(cross(omega, s), column_sum(step.C, n, q_dot))
+        a = add(cross(omega, s), column_sum(C, q_dot))
         put(step.w_0, u0, add(vector(memory.u[u0:]), turned(R, a)))
         for k in range(u0 + 3, u0 + 6 + n):
             step.w_0[k] = memory.u[k]
@@ -206,9 +209,10 @@ def keep_bodies(model, step, memory):
         for k in range(n):
             memory.q[q0 + k] = q[k]
         R = matrix(step.R_0[i])
-        s = center(model.body_types, t, n, q, step.C)
+        C = matrix_at(step.C, 0, 3, n)
+        s = center(model.body_types, t, n, q, C)
         put(memory.r[i], 0, sub(vector(step.c_0[i]), turned(R, s)))
-        a = add(cross(omega, s), column_sum(step.C, n, q_dot))
+        a = add(cross(omega, s), column_sum(C, q_dot))
         put(memory.u, u0, sub(vector(step.w_1[u0:]), turned(R, a)))
         for k in range(u0 + 3, u0 + 6 + n):
             memory.u[k] = step.w_1[k]
@@ -241,8 +245,8 @@ def body_step(model, step, i):
             step.q_1[q0 + k] = step.q_0[q0 + k] + dq
         step.q_mean[q0 + k] = step.q_0[q0 + k] + (0.0 if step.is_still else 0.5 * dq)
     if not step.is_closing:
-        put(step.s_1[i], 0, center(types, t, n, step.q_1[q0 : q0 + n], step.C))
-    put(step.s_mean[i], 0, center(types, t, n, step.q_mean[q0 : q0 + n], slice_of(step.C_mean, 3, q0, n)))
+        put(step.s_1[i], 0, center(types, t, n, step.q_1[q0 : q0 + n], matrix_at(step.C, 0, 3, n)))
+    put(step.s_mean[i], 0, center(types, t, n, step.q_mean[q0 : q0 + n], rows_of(step.C_mean, 3, q0, n)))
 
 
 @inner
@@ -257,15 +261,15 @@ def end_rates(model, discrete, step, i):
     omega, x, Y = vector(step.w_1[u0 + 3 :]), step.w_1[u0 + 6 : u0 + 6 + n], step.vector[:n]
     Pi = momenta(model.body_types, step, t, n, step.q_1[q0 : q0 + n], omega, x, Y)
     turning = sub(Pi, vector(step.P_0[u0 + 3 :]))
-    F, E = modal_matrix(discrete, t, FILTER, n), block(discrete, t, FREE_TURNING, 3 * n)
+    F, E = modal_matrix(discrete, t, FILTER, n), block(discrete, t, FREE_TURNING, 3, n)
     for k in range(n):
-        Y[k] -= step.P_0[u0 + 6 + k] + dot(column(E, n, k), turning)
+        Y[k] -= step.P_0[u0 + 6 + k] + dot(column(E, k), turning)
     for k in range(n):
         rate = 0.0
         for j in range(n):
             rate += F[k, j] * Y[j]
         x[k] -= 2.0 * rate
-        omega = add(omega, scaled(2.0 * rate, column(E, n, k)))
+        omega = add(omega, scaled(2.0 * rate, column(E, k)))
     put(step.w_1, u0 + 3, omega)
 
 
@@ -286,7 +290,7 @@ def body_inertia(model, discrete, step, i):
             out[u0 + 6 + k] = h * (Y[k] - step.P_0[u0 + 6 + k])
         return
     d, theta, Pi_0 = vector(step.z[u0:]), vector(step.z[u0 + 3 :]), vector(step.P_0[u0 + 3 :])
-    C_mean, N = slice_of(step.C_mean, 3, q0, n), step.force
+    C_mean, N = rows_of(step.C_mean, 3, q0, n), step.force
     put(out, u0, scaled(m, sub(d, scaled(h, turned_back(R, vector(step.w_0[u0:]))))))
     if discrete.scheme == VARIATIONAL:
         interval(model, discrete, step, i)
@@ -337,7 +341,7 @@ def interval(model, discrete, step, i):
         q[k] = step.q_0[q0 + k] + 0.5 * step.dq[q0 + k]
     put(step.P_1, u0 + 3, momenta(model.body_types, step, t, n, q, omega, rate, step.P_1[u0 + 6 : u0 + 6 + n]))
     if n:
-        C = step.C_interval
+        C = matrix_at(step.C_interval, 0, 3, n)
         center(model.body_types, t, n, q, C)
         middle = ModalMotion(q, omega, rate)
         inertia_force(model.body_types, discrete, step, t, n, middle, middle, q, C, step.force)

@@ -41,7 +41,7 @@ from floatframe.engine.kernels.joints.deformed_line import (
     unit_normal,
 )
 from floatframe.engine.kernels.joints.relative_motion import direction, distance
-from floatframe.engine.kernels.marker import shape
+from floatframe.engine.kernels.marker import shape_sum
 from floatframe.engine.kernels.rotation import exp_matrix
 from floatframe.engine.kernels.vector import (
     add,
@@ -68,6 +68,7 @@ from floatframe.engine.structure_preserving.kernels.markers import (
     mean_jacobian,
     put_end_of_forces,
     put_start,
+    step_shapes,
 )
 from floatframe.engine.structure_preserving.kernels.rows import add_product, held
 from floatframe.model.joints.rows.kinds import LINE_TURN
@@ -169,11 +170,7 @@ def line_step(model, discrete, step, k):
     put(step.lever[m], 0, lever)
     put_matrix(step.E_mean[m], scaled_matrix(0.5, matrix_sum(E_0, E_1)))
     put_shapes(model, discrete, step, k, s_0, s_1)
-    psi, dq = step.psi[6 * discrete.psi0[m] :], step.dq[q0 : q0 + n]
-    by_q, turn_by_q = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    for q in range(n):
-        d, th = shape(psi, n, q)
-        by_q, turn_by_q = add(by_q, scaled(dq[q], d)), add(turn_by_q, scaled(dq[q], th))
+    by_q, turn_by_q = shape_sum(step_shapes(model, discrete, step, m), step.dq[q0 : q0 + n])
     Gamma = mean_jacobian(th_0, th_1)
     put_matrix(step.Gamma[m], Gamma)
     put(step.dpsi[m], 0, turned(Gamma, turn_by_q))
@@ -186,17 +183,14 @@ def line_step(model, discrete, step, k):
 @loops
 def put_shapes(model, discrete, step, k, s_0, s_1):
     """Write the mean derivatives by q of the sliding marker's position and rotation, over both coordinates s."""
-    m, psi = model.lines.marker[k], step.psi
-    n = model.bodies.n_q[model.markers.body[m]]
-    own = psi[6 * discrete.psi0[m] : 6 * discrete.psi0[m] + 6 * n]
-    for q in range(6 * n):
-        own[q] = 0.0
+    own = step_shapes(model, discrete, step, model.lines.marker[k])
+    own[:, :] = 0.0
     for end in range(2):
         s = s_0 if end == 0 else s_1
         j, _ = piece(model.lines, model.stations, k, s)
-        first = psi[6 * discrete.psi0[model.stations.marker[j]] :]
-        second = psi[6 * discrete.psi0[model.stations.marker[j + 1]] :]
-        add_shapes(model, k, s, first, second, n, 0.5, own)
+        first = step_shapes(model, discrete, step, model.stations.marker[j])
+        second = step_shapes(model, discrete, step, model.stations.marker[j + 1])
+        add_shapes(model, k, s, first, second, 0.5, own)
 
 
 @inner

@@ -9,7 +9,7 @@ import math
 
 from floatframe.engine.kernels.body import column
 from floatframe.engine.kernels.compiler.compilation import inner, loops
-from floatframe.engine.kernels.dense import slice_of
+from floatframe.engine.kernels.dense import rows_of
 from floatframe.engine.kernels.joints.coordinate_force import excess, given_force
 from floatframe.engine.kernels.joints.loaded_rows import normal_part
 from floatframe.engine.kernels.time_function import time_function
@@ -88,7 +88,7 @@ def body_load(model, discrete, step, k):
     i, first = model.body_loads.body[k], model.body_loads.value0[k]
     n, u0, q0 = model.bodies.n_q[i], model.bodies.u0[i], model.bodies.q0[i]
     factor, _, _ = time_function(model.functions, model.body_loads.factor[k], step.t_force)
-    values, C = model.body_loads.values[first : first + 6 + n], slice_of(step.C_mean, 3, q0, n)
+    values, C = model.body_loads.values[first : first + 6 + n], rows_of(step.C_mean, 3, q0, n)
     f, tau, s = scaled(factor, vector(values)), scaled(factor, vector(values[3:])), vector(step.s_mean[i])
     far = matrix(step.R_0[i]) if step.is_still else matrix(step.R_1[i])
     R = scaled_matrix(0.5, matrix_sum(matrix(step.R_0[i]), far))
@@ -97,7 +97,7 @@ def body_load(model, discrete, step, k):
     put_sum(step.load, u0 + 3, T)
     work = dot(F, vector(step.d[i])) + dot(T, vector(step.theta_G[i]))
     for j in range(n):
-        h = factor * values[6 + j] - dot(column(C, n, j), f)
+        h = factor * values[6 + j] - dot(column(C, j), f)
         step.load[u0 + 6 + j] += h
         work += h * step.dq[q0 + j]
     return work

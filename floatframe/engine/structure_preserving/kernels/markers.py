@@ -24,8 +24,8 @@ Gonzalez (1996), Journal of Nonlinear Science 6, 449-467, of the map th -> exp(t
 import math
 
 from floatframe.engine.kernels.body import column_sum
-from floatframe.engine.kernels.compiler.compilation import inner, loops, small
-from floatframe.engine.kernels.dense import slice_of
+from floatframe.engine.kernels.compiler.compilation import inner, loops, small, view
+from floatframe.engine.kernels.dense import matrix_at, rows_of
 from floatframe.engine.kernels.marker import bent_shapes, shape, shape_sum
 from floatframe.engine.kernels.rotation import exp_matrix, left_jacobian
 from floatframe.engine.kernels.vector import (
@@ -49,7 +49,7 @@ from floatframe.engine.kernels.vector import (
 
 __all__ = ["add_direction", "add_force", "add_moment", "add_pair", "begin_markers", "begin_unit_load", "change",
            "distances", "end_unit_load", "ends", "marker_loads", "marker_step", "mean_direction", "put_end_of_forces",
-           "put_start", "turning"]  # fmt: skip
+           "put_start", "step_shapes", "turning"]  # fmt: skip
 
 SMALL = 1e-14  # square of an elastic rotation in a step below which its Cayley vector is T dth to roundoff
 NONE = (0.0, 0.0, 0.0)
@@ -58,13 +58,12 @@ NONE = (0.0, 0.0, 0.0)
 @loops
 def deformation(model, step, m, i, q, s):
     """Return the position of marker m relative to the centre of mass s, and its elastic rotation."""
-    n, o = model.bodies.n_q[i], model.markers.psi0[m]
     sigma = sub(vector(model.markers.position[m]), s)
-    if o < 0:
+    if model.markers.psi0[m] < 0:
         return sigma, NONE
-    psi = step.shape
-    bent_shapes(model, m, n, q, 0.5, psi)
-    d, th = shape_sum(psi, n, q)
+    psi = matrix_at(step.shape, 0, 6, model.bodies.n_q[i])
+    bent_shapes(model, m, q, 0.5, psi)
+    d, th = shape_sum(psi, q)
     return add(sigma, d), th
 
 
@@ -106,6 +105,12 @@ def put_start(step, m, i, arm, th, E):
     put_matrix(step.A_0[m], product(step.R_0[i], E))
 
 
+@view
+def step_shapes(model, discrete, step, m):
+    """Return the shapes Psi_sigma and Psi_r of marker m at q_mean, (6, n)."""
+    return rows_of(step.psi, 6, discrete.psi0[m], model.bodies.n_q[model.markers.body[m]])
+
+
 @loops
 def marker_step(model, discrete, step, m):
     """Write the motion of marker m over the step of its body."""
@@ -133,19 +138,19 @@ def marker_step(model, discrete, step, m):
     dx = add(vector(step.d[i]), cross(vector(step.theta_G[i]), lever))
     put_matrix(step.E_mean[m], scaled_matrix(0.5, matrix_sum(E_0, E_1)))
     if n:
-        o, C, dq = model.markers.psi0[m], slice_of(step.C_mean, 3, q0, n), step.dq[q0 : q0 + n]
-        psi = step.psi[6 * discrete.psi0[m] :]
-        if o >= 0:
-            bent_shapes(model, m, n, step.q_mean[q0 : q0 + n], 1.0, psi)
+        psi, C, dq = step_shapes(model, discrete, step, m), rows_of(step.C_mean, 3, q0, n), step.dq[q0 : q0 + n]
+        if model.markers.psi0[m] >= 0:
+            bent_shapes(model, m, step.q_mean[q0 : q0 + n], 1.0, psi)
         else:
-            psi[: 6 * n] = 0.0
-        for k in range(3 * n):
-            psi[k] -= C[k]
-        dx = add(dx, turned(R_m, column_sum(psi, n, dq)))
+            psi[:, :] = 0.0
+        for a in range(3):
+            for k in range(n):
+                psi[a, k] -= C[a, k]
+        dx = add(dx, turned(R_m, column_sum(psi, dq)))
         if discrete.turns[m]:
             Gamma = mean_jacobian(th_0, th_1)
             put_matrix(step.Gamma[m], Gamma)
-            put(step.dpsi[m], 0, turned(Gamma, column_sum(psi[3 * n :], n, dq)))
+            put(step.dpsi[m], 0, turned(Gamma, column_sum(psi[3:], dq)))
     put(step.dx[m], 0, dx)
 
 
@@ -307,8 +312,8 @@ def marker_loads(model, discrete, step, m):
     put_sum(step.load, u0 + 3, add(vector(step.T[0, m]), cross(vector(step.lever[m]), F)))
     if n == 0:
         return
-    psi, F_B = step.psi[6 * discrete.psi0[m] :], turned_back(step.R_m[i], F)
+    psi, F_B = step_shapes(model, discrete, step, m), turned_back(step.R_m[i], F)
     T = turned_back(step.Gamma[m], vector(step.m[0, m])) if discrete.turns[m] else NONE
     for k in range(n):
-        d, th = shape(psi, n, k)
+        d, th = shape(psi, k)
         step.load[u0 + 6 + k] += dot(d, F_B) + dot(th, T)

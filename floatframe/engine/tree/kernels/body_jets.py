@@ -13,7 +13,7 @@ changes by (b, B)·xi_ddot and by the product of the rotation part of xi_dot wit
 
 from floatframe.engine.kernels.body import block, column, column_sum, coupling, gyroscopic, inertia_rate
 from floatframe.engine.kernels.compiler.compilation import inner, small
-from floatframe.engine.kernels.dense import slice_of
+from floatframe.engine.kernels.dense import rows_of
 from floatframe.engine.kernels.model import C2, C3
 from floatframe.engine.kernels.vector import (
     add,
@@ -44,7 +44,7 @@ def moments_of_body(model, work, i, R):
 def momentum_of_modes(model, work, i, R):
     """Return the modal momentum of body i and Σ q_dot_k D_k, ground axes."""
     n, q0, u0 = model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i] + 6
-    p = column_sum(slice_of(work.bodies.C1, 3, q0, n), n, work.state.u[u0 : u0 + n])
+    p = column_sum(rows_of(work.bodies.C1, 3, q0, n), work.state.u[u0 : u0 + n])
     return turned(R, p), congruent(R, matrix(work.bodies.D_q_dot[i]))
 
 
@@ -61,9 +61,9 @@ def turning_of_momentum(m, s, J, by_modes, r, v, omega):
 def mode_row(model, work, i, k, R, v, omega):
     """Return b, B and the rotation derivatives of modal row k of body i about its origin; v, omega: body axes."""
     bodies, t, n, q0 = work.bodies, model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i]
-    W, Y = slice_of(bodies.W, 9, q0, n), slice_of(bodies.Y, 3, q0, n)
-    b, B = column(slice_of(bodies.C1, 3, q0, n), n, k), coupling(block(model.body_types, t, C2, 3 * n), W, n, k)
-    D = inertia_rate(block(model.body_types, t, C3, 9 * n), W, n, k)
+    W, Y = rows_of(bodies.W, 9, q0, n), rows_of(bodies.Y, 3, q0, n)
+    b, B = column(rows_of(bodies.C1, 3, q0, n), k), coupling(block(model.body_types, t, C2, 3, n), W, k)
+    D = inertia_rate(block(model.body_types, t, C3, 9, n), W, k)
     turning = add(cross(B, omega), turned(matrix_sum(D, transposed(D)), omega))
-    row = add(scaled(2.0, cross(v, b)), sub(scaled(2.0, column(Y, n, k)), turning))
+    row = add(scaled(2.0, cross(v, b)), sub(scaled(2.0, column(Y, k)), turning))
     return turned(R, b), turned(R, B), turned(R, row)

@@ -9,7 +9,7 @@ T w_dot + c, c = (dT/dth [w]) w. With a = a(|th|), b = b(|th|) of kernels/rotati
 import math
 
 from floatframe.engine.kernels.compiler.compilation import inner, loops, small
-from floatframe.engine.kernels.marker import bent_bias, shape_sum
+from floatframe.engine.kernels.marker import bent_bias, shape_sum, shapes_of
 from floatframe.engine.kernels.rotation import left_jacobian_derivative, quotient_b, quotient_da, quotient_db
 from floatframe.engine.kernels.vector import add, cross, dot, scaled, sub, turned, vector
 
@@ -27,8 +27,7 @@ SERIES_UP_TO = 4.0  #: value of t² below which series replace the closed forms,
 @inner
 def deformation_accelerations(model, work, m, i):
     """Return the second rates of position and elastic rotation vector of marker m relative to its body i."""
-    n, o, u0 = model.bodies.n_q[i], model.markers.psi0[m], model.bodies.u0[i] + 6
-    d, th = shape_sum(work.markers.psi[o : o + 6 * n], n, work.state.u_dot[u0 : u0 + n])
+    d, th = shape_sum(shapes_of(model, work.markers.psi, m), work.state.u_dot[model.bodies.u0[i] + 6 :])
     b_t, b_r = bent_bias(model, work, m, i)
     return add(d, b_t), add(th, b_r)
 

@@ -12,6 +12,7 @@ projection, of the kinematics, and of forces that are fixed in body axes or grou
 from floatframe.engine.kernels.body import moved_inertia, newton_block
 from floatframe.engine.kernels.compiler.compilation import inner, small
 from floatframe.engine.kernels.connections.connection import connection_derivatives
+from floatframe.engine.kernels.dense import matrix_at
 from floatframe.engine.kernels.evaluation import tangent_of_body
 from floatframe.engine.kernels.marker import bent_rate
 from floatframe.engine.kernels.vector import (
@@ -284,7 +285,7 @@ def kept_marker(model, work, tree, tangent, m, first, rate):
     spin = turned(R, state.u[u0 + 3 :])
     V = sub(vector(state.u[u0:]), cross(spin, origin)), spin
     if model.markers.bend0[m] >= 0:
-        bent_rate(model, work, m, i, work.markers.bend_dot[: 6 * model.bodies.n_q[i]])
+        bent_rate(model, work, m, i, matrix_at(work.markers.bend_dot, 0, 6, model.bodies.n_q[i]))
     for k in range(model.bodies.n_q[i]):
         s, s_1, _ = mode_rate(model, work, m, i, k)
         unit = world_screw(R, origin, s)

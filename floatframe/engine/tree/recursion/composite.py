@@ -12,7 +12,7 @@ Sources: Walker & Orin (1982); Featherstone (2008), chapter 6.
 
 from floatframe.engine.kernels.body import block, body_forces, column, coupling, modal_block, moved_inertia
 from floatframe.engine.kernels.compiler.compilation import loops, small, view
-from floatframe.engine.kernels.dense import slice_of
+from floatframe.engine.kernels.dense import rows_of
 from floatframe.engine.kernels.model import C2, MASS
 from floatframe.engine.kernels.vector import (
     add,
@@ -89,10 +89,10 @@ def flexible_mass(nodes, work, model, marker_work, k):
     H[:, :] = 0.0
     A, B, C = rigid_blocks(work.mass[k], vector(work.s[k]), matrix(work.J[k]))
     put_blocks(H, A, B, C)
-    first = slice_of(marker_work.bodies.C1, 3, q0, n)
-    W, second, R = slice_of(marker_work.bodies.W, 9, q0, n), block(types, t, C2, 3 * n), work.R_G[k]
+    first = rows_of(marker_work.bodies.C1, 3, q0, n)
+    W, second, R = rows_of(marker_work.bodies.W, 9, q0, n), block(types, t, C2, 3, n), work.R_G[k]
     for j in range(n):
-        b, B = turned(R, column(first, n, j)), turned(R, coupling(second, W, n, j))
+        b, B = turned(R, column(first, j)), turned(R, coupling(second, W, j))
         put(H[6 + j], 0, b)
         put(H[6 + j], 3, B)
         put_column(H, 0, 6 + j, b)

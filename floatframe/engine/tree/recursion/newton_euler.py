@@ -18,7 +18,7 @@ Sources: Walker & Orin (1982); Featherstone (2008), chapter 5; for bodies in flo
 
 from floatframe.engine.kernels.body import body_forces
 from floatframe.engine.kernels.compiler.compilation import loops, small
-from floatframe.engine.kernels.marker import shape
+from floatframe.engine.kernels.marker import shape, shapes_of
 from floatframe.engine.kernels.rotation import matrix_of_euler_parameters
 from floatframe.engine.kernels.vector import (
     add,
@@ -44,14 +44,12 @@ __all__ = ["newton_euler"]
 @loops
 def add_modal_forces(model, marker_work, m, f, t, sign, out):
     """Add sign times the modal forces of a wrench on marker m, body axes at its point, to out, (n,)."""
-    o = model.markers.psi0[m]
-    if o < 0:
+    if model.markers.psi0[m] < 0:
         return
-    n = out.shape[0]
-    psi = marker_work.markers.psi[o : o + 6 * n]
+    psi = shapes_of(model, marker_work.markers.psi, m)
     s = turned_back(marker_work.markers.T_left[m], t)
-    for k in range(n):
-        d, th = shape(psi, n, k)
+    for k in range(psi.shape[1]):
+        d, th = shape(psi, k)
         out[k] += sign * (dot(d, f) + dot(th, s))
 
 
