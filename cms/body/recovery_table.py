@@ -9,7 +9,7 @@ force, D_0 is the mode displacement method. D_2 and L add the static response to
 Together they are the mode acceleration method (docs/theory.md §11).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
@@ -18,16 +18,17 @@ import numpy as np
 from cms.body.geometric_stiffness import SPIN_PAIRS
 from cms.errors import BodyError
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.documents.table import Table, Tabular
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import ArrayShape, checked_fields, frozen_copies
-from fe_models.foundation.units import Dimensions, Units, unit_words
+from fe_models.foundation.units import Dimensions, Units, unit_text, unit_words
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["N_RIGID", "RecoveryTable", "spin_accelerations", "spin_change", "spin_products"]
+__all__ = ["N_RIGID", "ORDERS", "RecoveryTable", "row_table", "spin_accelerations", "spin_change", "spin_products"]
 
 N_RIGID = 6  #: number of coordinates of z before q: three of d and three of theta
-ORDERS = ("position", "velocity", "acceleration")  #: derivatives of z, in the order of `dynamic`
+ORDERS = ("displacement", "velocity", "acceleration")  #: derivatives of z, in the order of `dynamic`
 TEXTS = ("labels", "quantities", "entities", "components")
 
 
@@ -35,7 +36,7 @@ TEXTS = ("labels", "quantities", "entities", "components")
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ArgumentError)
-class RecoveryTable:
+class RecoveryTable(Tabular):
     """Recovery matrices with named rows. Row components are in mesh or element axes, columns in axes of B.
 
     Parameters
@@ -148,6 +149,26 @@ class RecoveryTable:
             total = total + np.asarray(columns) @ matrix.T
         return np.asarray(total)
 
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Name of each coordinate of z."""
+        return (*(f"d {a}" for a in "xyz"), *(f"theta {a}" for a in "xyz"), *(f"q {k + 1}" for k in range(self.n_q)))
+
+    @property
+    def coordinate_units(self) -> tuple[str, ...]:
+        """Unit of each coordinate of z."""
+        kinds = [Dimensions(0, 1)] * 3 + [Dimensions()] * 3 + [Dimensions(0.5, 1)] * self.n_q
+        return tuple(unit_text(self.system, kind) for kind in kinds)
+
+    def to_table(self) -> Table:
+        """Return label, number and unit of each row, and its factors of z, its derivatives and the loads (`row_table`).
+
+        Units in brackets are units of the coordinate; for its velocity and acceleration divide by time and time².
+        """
+        matrices = dict(zip(ORDERS, self.dynamic, strict=True)) | {"load": self.static}
+        columns = dict(zip(self.coordinates, self.coordinate_units, strict=True))
+        return row_table(self, matrices, columns, dict(zip(self.loads, self.load_units, strict=True)))
+
     def rows(self, wanted: str) -> IntArray:
         """Return the rows with this label or quantity, or whose labels begin with these words.
 
@@ -219,6 +240,31 @@ class RecoveryTable:
         dynamic = [row[:, None] / factors(z, -k) * matrix for k, matrix in enumerate(self.dynamic)]
         static = row[:, None] / factors(self.load_dimensions).reshape(1, -1) * self.static
         return replace(self, dynamic=np.array(dynamic), static=static, system=new)
+
+
+def row_table(
+    rows: RecoveryTable, matrices: Mapping[str, Array], coordinates: Mapping[str, str], loads: Mapping[str, str]
+) -> Table:
+    """Return names, number and unit of each row, then its entries; zero matrices are omitted.
+
+    Parameters
+    ----------
+    matrices
+        Matrices over coordinates, and "load" over the loads, by name.
+    coordinates, loads
+        Units of the columns by name.
+    """
+    columns: dict[str, Any] = {
+        "label": rows.labels, "quantity": rows.quantities, "entity": rows.entities, "number": rows.numbers,
+        "component": rows.components, "unit": rows.units,
+    }  # fmt: skip
+    units: dict[str, str] = {}
+    for name, matrix in matrices.items():
+        if not np.any(matrix):
+            continue
+        for (column, unit), values in zip((loads if name == "load" else coordinates).items(), matrix.T, strict=True):
+            columns[f"{name}: {column}"], units[f"{name}: {column}"] = values, unit
+    return Table(columns, units, {"name": rows.name, "unit system": rows.system.name, "truncated": rows.truncated})
 
 
 def spin_products(omega: Array) -> Array:

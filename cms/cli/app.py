@@ -246,7 +246,10 @@ def recovery_command(
     ] = "modes",
     units: Annotated[str | None, typer.Option(help="Unit system of the numbers; default: that of the body.")] = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="File: .npz, .mat, .op4, .csv, or .h5 with the tables added.")
+        Path | None,
+        typer.Option(
+            "--output", "-o", help="File: .npz, .mat, .op4, .csv, .json, .parquet, or .h5 with the tables added."
+        ),
     ] = None,
 ) -> None:
     """List or write the recovery rows of a modal file.

@@ -88,7 +88,7 @@ def write_outputs(
     table
         Returns the table, for `TABLES`.
     record
-        Result in plain types, for .json; None: the table is written.
+        Result in plain types, for .json, with the table under "table"; None: the table alone is written.
     document
         Returns the document, for `DOCUMENTS`.
     figure
@@ -110,7 +110,7 @@ def write_outputs(
             made = others[ending](path)
             contents |= {path: made} if isinstance(made, bytes) else made
         elif ending == ".json" and record is not None:
-            contents[path] = json_text(record).encode()
+            contents[path] = json_text(record if table is None else {**record, "table": table().record()}).encode()
         elif ending in DOCUMENTS and document is not None:
             from fe_models.foundation.documents.write import document_content
 

@@ -181,7 +181,7 @@ def shake_command(
         light, _ = light_record(shake_record(result), "")
         if "curves" in light:
             light["curves"] = "omitted here; -o NAME.json writes them into NAME.npz"
-        typer.echo(dumps(light, indent=1))
+        typer.echo(dumps(light | {"table": shake_table(result).record()}, indent=1))
     else:
         print_result(result)
 
@@ -191,6 +191,7 @@ def shake_command(
         if beside in paths:  # the table
             beside = path.with_name(f"{path.stem}_curves.npz")
         light, curves = light_record(shake_record(result), beside.name)
+        light |= {"table": shake_table(result).record()}
         files = {path: (dumps(light, separators=(",", ":")) + "\n").encode()}
         if curves:
             files[output_path(beside, None, ModelError, overwrite_of=inputs)] = npz_of(curves)

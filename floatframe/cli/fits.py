@@ -210,7 +210,7 @@ def optimize_command(
     else:
         print_optimum(result)
     write_outputs(
-        paths, table=lambda: history_table(result), record=record, figure=lambda: plot_history(result),
+        paths, table=result.to_table, record=record, figure=lambda: plot_history(result),
         others={".toml": lambda _: best_system(result).encode()}, is_quiet=json,
     )  # fmt: skip
 
@@ -245,7 +245,7 @@ def bound_of(parameter: Any, result: "OptimizationResult") -> str:
 
 def row_record(result: "OptimizationResult", row: "Evaluated") -> dict[str, Any]:
     """Return a row of the history in plain types; values missing in a failed evaluation are null."""
-    from floatframe.design.optimization.optimize import numbers_by_name
+    from floatframe.design.optimization.optimize import numbers_by_name, purpose_of
 
     is_failed = bool(row.evaluation.error)
     numbers = numbers_by_name(result.design, row.evaluation)
@@ -254,7 +254,7 @@ def row_record(result: "OptimizationResult", row: "Evaluated") -> dict[str, Any]
         "numbers": {name: None if is_failed else number for name, number in numbers.items()},
         "objective": None if is_failed else row.objective,
         "violation": None if is_failed else row.violation,
-        "purpose": "difference" if row.is_difference else "trial",
+        "purpose": purpose_of(row),
         "error": row.evaluation.error or None,
     }
 
@@ -299,16 +299,3 @@ def best_system(result: "OptimizationResult") -> str:
     except SystemFileError:
         document = dict(read_parametric(path, SystemFileError, values))
     return str(tomlkit.dumps(document))
-
-
-def history_table(result: "OptimizationResult") -> "Table":
-    """Return the history; the numbers of a failed evaluation are missing."""
-    from fe_models.foundation.documents.table import Table
-
-    names = [p.name for p in result.design.parameters] + [q.output.name for q in result.design.quantities]
-    rows = []
-    for i, row in enumerate(result.history):
-        r = row_record(result, row)
-        numbers = (*r["parameters"].values(), *r["numbers"].values(), r["objective"], r["violation"])
-        rows.append((i + 1, r["purpose"], *numbers, row.evaluation.error))
-    return Table.of_rows(("evaluation", "purpose", *names, "objective", "violation", "error"), rows)

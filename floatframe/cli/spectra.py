@@ -142,10 +142,8 @@ def plot_as(
 
 
 def write_spectra(signals: "Signals", kind: str, request: "SpectrumRequest", path: Path, *, title: str) -> None:
-    """Write spectra of all channels as picture, table or record, and print a summary."""
-    import json
-
-    from floatframe.files.signals.analysis import spectra_of, spectral_record, spectral_table
+    """Write spectra of all channels as picture or table, and print a summary."""
+    from floatframe.files.signals.analysis import spectra_of, spectral_table
     from floatframe.files.signals.spectra import Spectrum
     from floatframe.pictures.spectrum_plots import plot_spectra
 
@@ -159,7 +157,4 @@ def write_spectra(signals: "Signals", kind: str, request: "SpectrumRequest", pat
     if rows:
         heads = ("", "kind", "unit", "greatest>", "at Hz>", "resolution Hz>", "averages>")
         print_table("Spectra", heads, rows)
-    write_outputs(
-        [path], table=lambda: spectral_table(spectra), figure=lambda: plot_spectra(spectra, title=title),
-        others={".json": lambda _: (json.dumps(spectral_record(spectra), ensure_ascii=True) + "\n").encode()},
-    )  # fmt: skip
+    write_outputs([path], table=lambda: spectral_table(spectra), figure=lambda: plot_spectra(spectra, title=title))

@@ -1,4 +1,4 @@
-"""Recovery matrices in files for other programs (npz, mat, op4, csv), with names and units.
+"""Recovery matrices in files: for other programs (npz, mat, op4), or as a table (csv, json, parquet).
 
 The coordinates x are z = (d, theta, q) or (u_b, eta). Rows = displacement @ x + velocity @ x' + acceleration @ x'' +
 load @ p. Mass M, damping D and stiffness K over x are included.
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from cms.body.modal_file.file import convert_units
-from cms.body.recovery_table import N_RIGID, RecoveryTable
+from cms.body.recovery_table import N_RIGID, ORDERS, RecoveryTable, row_table
 from cms.body.reduced_body import ReducedBody
 from cms.errors import ExportError, RecoveryError
 from cms.reduction.interface_model import InterfaceModel, interface_model
@@ -44,10 +44,9 @@ __all__ = [
 
 
 OVER = ("modes", "interfaces")
-ORDERS = ("displacement", "velocity", "acceleration")
 OP4_NAMES = {"displacement": "DRMD", "velocity": "DRMV", "acceleration": "DRMA", "load": "DRMF", "M": "MXX", "K": "KXX",
              "D": "BXX", "rigid": "RBM"}  # fmt: skip
-LENGTH, NONE, MODAL, UNIT_MASS = Dimensions(0, 1), Dimensions(), Dimensions(0.5, 1), Dimensions(0.5, 1)
+LENGTH, NONE, MODAL = Dimensions(0, 1), Dimensions(), Dimensions(0.5, 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,8 +135,7 @@ def content_of(body: ReducedBody, table: RecoveryTable, over: str) -> _Content:
     """Return the matrices over z or over the interface coordinates."""
     if over == "modes":
         M, D, K = on_coordinates(body)
-        names = (*(f"d {a}" for a in "xyz"), *(f"theta {a}" for a in "xyz"), *(f"q {k + 1}" for k in range(body.n_q)))
-        kinds = [LENGTH] * 3 + [NONE] * 3 + [MODAL] * body.n_q
+        names, units = table.coordinates, table.coordinate_units
         matrices = dict(zip(ORDERS, table.dynamic, strict=True)) | {"load": table.static}
         equations = {"M": M, "D": D, "K": K}
         loads, load_units = table.loads, table.load_units
@@ -147,11 +145,11 @@ def content_of(body: ReducedBody, table: RecoveryTable, over: str) -> _Content:
         n_modes = len(made.M) - made.n_b
         names = (*made.boundary, *(f"mode {k + 1}" for k in range(n_modes)))
         kinds = [NONE if name.endswith(("rx", "ry", "rz")) else LENGTH for name in made.boundary] + [MODAL] * n_modes
+        units = tuple(unit_text(body.units, kind) for kind in kinds)
         matrices = {order: getattr(rows, order) for order in ORDERS} | {"load": rows.load}
         equations = {"M": made.M, "D": made.D, "K": made.K, "rigid": made.rigid}
         loads = rows.loads
         load_units = tuple(table.load_units[table.loads.index(name)] for name in loads)
-    units = tuple(unit_text(body.units, kind) for kind in kinds)
     return _Content(table, matrices, names, units, loads, load_units, equations, over)
 
 
@@ -224,23 +222,10 @@ def op4_files(path: Path, content: _Content) -> Files:
     )
     files = {
         path: b"".join(op4_parts(f"OP4 file {path}", kept)),
-        rows: Table.of_rows(ROW_HEAD, row_words(content.table)).content(".csv"),
+        rows: row_table(content.table, {}, {}, {}).content(".csv"),
         columns: Table.of_rows(("matrix", "column", "name", "unit"), column_words(content)).content(".csv"),
     }
     return files, notes
-
-
-ROW_HEAD = ("label", "quantity", "entity", "number", "component", "unit")
-
-
-def row_words(table: RecoveryTable) -> list[tuple[Any, ...]]:
-    """Return name, number and unit of each row."""
-    return list(
-        zip(
-            table.labels, table.quantities, table.entities, map(int, table.numbers), table.components, table.units,
-            strict=True,
-        )
-    )  # fmt: skip
 
 
 def column_words(content: _Content) -> list[tuple[str, int, str, str]]:
@@ -251,34 +236,27 @@ def column_words(content: _Content) -> list[tuple[str, int, str, str]]:
     return words + [("DRMF", k + 1, name, unit) for k, (name, unit) in enumerate(of_loads)]
 
 
-def csv_files(path: Path, content: _Content) -> Files:
+def table_files(path: Path, content: _Content) -> Files:
     """Return one table: names, number and unit of each row, then its entries; zero matrices are omitted."""
-    table: dict[str, Any] = dict(Table.of_rows(ROW_HEAD, row_words(content.table)).columns)
-    table_units: dict[str, str] = {}
-    left: list[str] = []
-    for name, matrix in content.matrices.items():
-        if not matrix.size or not np.any(matrix):
-            left.append(name)
-            continue
-        of_loads = name == "load"
-        columns = content.loads if of_loads else content.coordinates
-        units = content.load_units if of_loads else content.coordinate_units
-        for column, unit, values in zip(columns, units, matrix.T, strict=True):
-            table[f"{name}: {column}"], table_units[f"{name}: {column}"] = values, unit
-    notes: tuple[str, ...] = (
+    coordinates = dict(zip(content.coordinates, content.coordinate_units, strict=True))
+    loads = dict(zip(content.loads, content.load_units, strict=True))
+    table = row_table(content.table, content.matrices, coordinates, loads)
+    zero = [name for name, matrix in content.matrices.items() if not np.any(matrix)]
+    notes = (
         "units in brackets are units of the coordinate; for its velocity and acceleration divide by time and time²",
+        *((f"zero and left out: {', '.join(zero)}",) if zero else ()),
+        "mass, damping and stiffness are not in the table",
     )
-    if left:
-        notes += (f"zero and left out: {', '.join(left)}",)
-    notes += ("mass, damping and stiffness are not in the table",)
-    return {path: Table(table, table_units).content(".csv")}, notes
+    return {path: table.content(path.suffix)}, notes
 
 
 RECOVERY_FORMATS: dict[str, Callable[[Path, _Content], Files]] = {
     ".npz": npz_files,
     ".mat": mat_files,
     ".op4": op4_files,
-    ".csv": csv_files,
+    ".csv": table_files,
+    ".json": table_files,
+    ".parquet": table_files,
 }  #: writer of each file suffix
 
 

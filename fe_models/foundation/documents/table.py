@@ -173,6 +173,20 @@ class Table:
                 raise
             raise TableError(f"{where}: {suffix} cannot hold it: {error}") from error
 
+    def record(self) -> dict[str, Any]:
+        """Return the table in plain types, as .json holds it.
+
+        NaN is None, an infinity the text "inf" or "-inf", a complex column two lists.
+        """
+        record = header_of(self)
+        for each in record["columns"]:
+            values = self[each["name"]]
+            is_complex = values.dtype.kind == "c"
+            parts = {"real": values.real, "imag": values.imag} if is_complex else {"": values}
+            found = {key: [json_number(v) for v in part.tolist()] for key, part in parts.items()}
+            each["values"] = found if is_complex else found[""]
+        return record
+
     def to_dataframe(self, index: str | None = None) -> "DataFrame":
         """Return a pandas DataFrame, with the units by column in `attrs["units"]`, and a column as index.
 
@@ -450,15 +464,8 @@ def column_of_cells(cells: list[tuple[str, bool]]) -> Column:
 
 
 def json_content(table: Table) -> bytes:
-    """Return JSON: NaN is null, an infinity the text "inf" or "-inf", a complex column two lists."""
-    header = header_of(table)
-    for each in header["columns"]:
-        values = table[each["name"]]
-        is_complex = values.dtype.kind == "c"
-        parts = {"real": values.real, "imag": values.imag} if is_complex else {"": values}
-        found = {key: [json_number(v) for v in part.tolist()] for key, part in parts.items()}
-        each["values"] = found if is_complex else found[""]
-    return (json.dumps(header, ensure_ascii=False, allow_nan=False) + "\n").encode()
+    """Return the record of a table as JSON."""
+    return (json.dumps(table.record(), ensure_ascii=False, allow_nan=False) + "\n").encode()
 
 
 def json_number(value: Any) -> Any:
@@ -469,8 +476,10 @@ def json_number(value: Any) -> Any:
 
 
 def read_json(content: bytes) -> Table:
-    """Return the table of `json_content`."""
+    """Return the table of `json_content`, or the one under "table" in the record of a command."""
     header = json.loads(content)
+    if isinstance(header, dict) and "table" in header:
+        header = header["table"]
 
     def values(k: int, _: str) -> Any:
         each = header["columns"][k]

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.documents.table import Table, Tabular
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.tasks.campaign import Campaign, TaskJournal
 from fe_models.foundation.tasks.task_map import TaskMap
@@ -51,7 +52,7 @@ class Evaluated:
 
 @presented
 @dataclass(frozen=True, eq=False)
-class OptimizationResult:
+class OptimizationResult(Tabular):
     """The best point, and the history of the search."""
 
     design: Design
@@ -79,6 +80,22 @@ class OptimizationResult:
     def n_failed(self) -> int:
         """Number of failed evaluations."""
         return sum(bool(row.evaluation.error) for row in self.history)
+
+    def to_table(self) -> Table:
+        """Return the history, one row for each evaluation; the numbers of a failed one are missing."""
+        names = [p.name for p in self.design.parameters] + [q.output.name for q in self.design.quantities]
+        rows = []
+        for number, row in enumerate(self.history, start=1):
+            made = row.evaluation
+            found = [*numbers_by_name(self.design, made).values(), row.objective, row.violation]
+            numbers = [None] * len(found) if made.error else found
+            rows.append((number, purpose_of(row), *made.values, *numbers, made.error))
+        return Table.of_rows(("evaluation", "purpose", *names, "objective", "violation", "error"), rows)
+
+
+def purpose_of(row: Evaluated) -> str:
+    """Return for what a row was computed."""
+    return "difference" if row.is_difference else "trial"
 
 
 def numbers_by_name(design: Design, evaluation: Evaluation) -> dict[str, float]:

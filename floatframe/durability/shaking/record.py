@@ -101,7 +101,6 @@ def shake_record(result: ShakeResult) -> dict[str, Any]:
             {"kind": kind, "test": test, "direction": direction, **notched_record(model, kind, run)}
             for (kind, test, direction), run in result.notched.items()
         ],
-        "table": [dict(zip(COLUMNS, row, strict=True)) for row in table_rows(result)],
     }
 
 

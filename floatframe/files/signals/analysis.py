@@ -21,7 +21,7 @@ from floatframe.files.signals.transfer import TransferEstimate, transfer_estimat
 from floatframe.results.sensors.measurement import Measurement
 
 __all__ = [
-    "SPECTRA", "SpectrumRequest", "even_signals", "signals_of", "spectra_of", "spectral_record", "spectral_table",
+    "SPECTRA", "SpectrumRequest", "even_signals", "signals_of", "spectra_of", "spectral_table",
 ]  # fmt: skip
 
 
@@ -32,8 +32,12 @@ AnySpectrum = Spectrum | SpectralMap | TransferEstimate
 
 
 def spectral_table(spectra: Sequence[AnySpectrum]) -> Table:
-    """Return spectra as a table: side by side over common frequencies, maps one below the other."""
+    """Return spectra as a table: side by side over common frequencies, maps one below the other.
+
+    `meta["spectra"]` states of each how it was computed.
+    """
     first = spectra[0]
+    meta = {"spectra": [settings_of(each) for each in spectra]}
     if isinstance(first, SpectralMap):
         line, size = "order" if first.kind == "order" else "frequency", "rms" if first.is_rms else "peak"
         rows = []
@@ -43,7 +47,8 @@ def spectral_table(spectra: Sequence[AnySpectrum]) -> Table:
             for t, speed, row in zip(each.times.tolist(), speeds, each.amplitudes.tolist(), strict=True):
                 rows += [(each.name, t, speed, x, a, each.unit) for x, a in zip(each.lines.tolist(), row, strict=True)]
         names = ("name", "time", "speed", line, f"amplitude ({size})", "unit")
-        return Table.of_rows(names, rows, {"time": "s", "speed": "rad/s"} | ({} if line == "order" else {line: "Hz"}))
+        units = {"time": "s", "speed": "rad/s"} | ({} if line == "order" else {line: "Hz"})
+        return Table.of_rows(names, rows, units, meta)
     columns: dict[str, Array] = {"frequency": first.frequencies}
     if isinstance(first, Spectrum) and first.edges is not None:
         columns |= {"from": first.edges[:, 0], "to": first.edges[:, 1]}
@@ -60,12 +65,12 @@ def spectral_table(spectra: Sequence[AnySpectrum]) -> Table:
             units[f"{each.name} {each.kind}"] = each.unit
     if len({len(values) for values in columns.values()}) != 1:
         raise SignalError("spectra over different frequencies do not fit into one table; write them separately")
-    return Table(columns, units)
+    return Table(columns, units, meta)
 
 
-def spectral_record(spectra: Sequence[AnySpectrum]) -> list[dict[str, Any]]:
-    """Return spectra in plain types: fields by name, complex numbers as two parts, NaN as None."""
-    return [{key: plain(value) for key, value in vars(each).items()} for each in spectra]
+def settings_of(spectrum: AnySpectrum) -> dict[str, Any]:
+    """Return how a spectrum was computed: its fields that are no arrays, in plain types."""
+    return {key: plain(value) for key, value in vars(spectrum).items() if not isinstance(value, np.ndarray)}
 
 
 def plain(value: Any) -> Any:

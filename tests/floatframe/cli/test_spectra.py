@@ -1,12 +1,12 @@
 """Spectra and choice of sensors on the command line, of results and of measured files."""
 
 import csv
-import json
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from fe_models.files import read_table
 from floatframe.files.signals import Signals, read_signals, write_rpc
 from tests.floatframe.command import run_floatframe
 
@@ -101,9 +101,10 @@ def test_the_amplitude_of_a_driven_box_stands_at_its_frequency(results, tmp_path
 def test_third_octaves_of_all_sensors_as_json_hold_the_mean_square(results, tmp_path):
     out = tmp_path / "a.json"
     run_floatframe("spectrum", results, "-s", "box 1.x", "--as", "third-octave", "--resolution", 1, "-o", out, code=0)
-    (record,) = json.loads(out.read_text())
-    assert (record["kind"], record["unit"], record["name"]) == ("1/3 octave (rms)", "mm", "box 1.x")
-    levels = dict(zip(record["frequencies"], record["values"], strict=True))
+    found = read_table(out)
+    (settings,) = found.meta["spectra"]
+    assert (settings["kind"], settings["unit"], settings["name"]) == ("1/3 octave (rms)", "mm", "box 1.x")
+    levels = dict(zip(found["frequency"].tolist(), found["box 1.x 1/3 octave (rms)"].tolist(), strict=True))
     near = min(levels, key=lambda f: abs(f - 20))
     assert_allclose(levels[near], np.sqrt(2.0), rtol=0.01, atol=0)
 

@@ -12,6 +12,7 @@ import cms
 from cms.errors import RecoveryError
 from cms.reduction.recovery.files import write_recovery
 from cms.reduction.recovery.load_columns import forces_of_loads
+from fe_models.files import read_table
 from tests.cms.command import run_cms
 from tests.cms.reduction.recovery.examples import reduced
 
@@ -133,6 +134,15 @@ def test_all_formats_hold_the_same_matrices(tmp_path, over):
     assert [row["unit"] for row in rows] == list(table.units)
     with open(tmp_path / "all.csv", newline="") as stream:
         rows = list(csv.DictReader(stream))
+    for suffix in ("json", "parquet"):
+        write_recovery(body, tmp_path / f"all.{suffix}", over=over)
+        again = read_table(tmp_path / f"all.{suffix}")
+        assert again.meta["name"] == "all"
+        for name in ("displacement", "acceleration"):
+            columns = [again[key] for key in again.names if key.startswith(f"{name}: ")]
+            np.testing.assert_array_equal(np.transpose(columns), npz[name])
+    if over == "modes":
+        assert again.heads == table.to_table().heads
     column = next(key for key in rows[0] if key.startswith("acceleration: "))
     assert [float(row[column]) for row in rows] == npz["acceleration"][:, 0].tolist()
     assert len(rows[0]) == 6 + sum(npz[name].shape[1] for name in ("displacement", "velocity", "acceleration", "load"))

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from fe_models.files import read_table
 from fe_models.foundation.toml_file import FileContent, changed
 from floatframe import GeneralizedAlpha, integrate
 from floatframe.design.studies.study import StudyPoint, report_notes, run_study
@@ -114,6 +115,9 @@ def test_points_in_other_processes_give_one_table_csv_json_and_picture(folder):
     record = json.loads((folder / "out.json").read_text())
     assert record["points"][3]["parameters"] == {"gravity": -1.62, "mass": 1.0}
     assert float(rows[3][2]) == record["points"][3]["outputs"]["swing"]
+    table = read_table(folder / "out.json")
+    assert table.names == ("gravity", "mass", "swing", "error")
+    assert table["swing"].tolist() == [float(row[2]) for row in rows]
     assert (folder / "out.png").read_bytes().startswith(b"\x89PNG")
 
 
