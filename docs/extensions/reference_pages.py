@@ -1,4 +1,4 @@
-"""Reference pages, made from the programs: commands with their options, keys of every kind of file, fields of decks."""
+"""Reference pages, made from the programs: commands, keys of text files, content of HDF5 files, fields of decks."""
 
 import json
 import re
@@ -13,9 +13,13 @@ from sphinx.application import Sphinx
 import cms.cli.app
 import cms.cli.exchange
 import floatframe.cli.app
+from cms.body.modal_file.schema import ENTRIES, GROUPS, dataset_of
 from fe_models.files.field_pages import field_tables
 from fe_models.foundation.file_kinds import KINDS
 from fe_models.foundation.parametric_file import schema_text
+from fe_models.foundation.units import Units
+from floatframe.engine.kernels.memory import Rows
+from floatframe.results.results_file import DATASETS
 
 PROGRAMS = {"cms": cms.cli.app.app, "floatframe": floatframe.cli.app.app}
 
@@ -26,6 +30,7 @@ def write_pages(app: Sphinx) -> None:
     folder.mkdir(exist_ok=True)
     pages = {f"{name}-commands.md": commands_page(name) for name in PROGRAMS}
     pages |= {f"{kind}-file.md": keys_page(kind) for kind in KINDS}
+    pages |= {"modal-file.md": modal_file_page(), "results-file.md": results_file_page()}
     pages |= {"deck-fields.md": fields_page(), "formats.md": formats_page()}
     for old in folder.glob("*.md"):
         if old.name not in pages:
@@ -104,6 +109,52 @@ def keys_table(definition: dict[str, Any]) -> list[str]:
         meaning = next((each["description"] for each in found if "description" in each), "")
         rows.append((f"`{key}`", literal(meaning), f"`{defaults[0]}`" if defaults and len(defaults[0]) < 60 else ""))
     return table(("key", "meaning", "default"), rows)
+
+
+# HDF5 files ------------------------------------------------------------------------------------------------------
+
+#: dimensions in place of the units of a unit system
+DIMENSIONS = Units("", 1.0, 1.0, 1.0, "length", "mass", "time", "", "")
+KINDS_OF_VALUES = {str: "text", int: "integer", bool: "integer", float: "float"}
+#: sizes of a results file under the names that its page explains
+SIZES = {"n_c": "n_joints", "angles": "n_angles", "loads": "n_loads", "body loads": "n_load_cases"}
+
+
+def modal_file_page() -> str:
+    """Return the page of the groups of a modal file, with their attributes and datasets."""
+    lines = [
+        "# Content of a modal file", "",
+        "[The modal file](../modal_file.md) explains sizes, symbols and storage.", "",
+    ]  # fmt: skip
+    for group, layout in GROUPS.items():
+        attributes = [
+            (f"`{name}`", KINDS_OF_VALUES[kind], literal(meaning))
+            for name, (kind, meaning) in layout.attributes.items()
+        ]
+        datasets = [
+            (f"`{name}`", entry.shape, dataset_of(path, (), DIMENSIONS).unit, literal(entry.description))
+            for path, entry in ENTRIES.items()
+            if (name := path.removeprefix(f"{group.rstrip('/')}/")) != path and "/" not in name
+        ]
+        lines += [f"## `{group}`", "", literal(layout.meaning), ""]
+        lines += [*table(("attribute", "type", "meaning"), attributes), ""] if attributes else []
+        lines += [*table(("dataset", "shape", "unit", "meaning"), datasets), ""] if datasets else []
+    return "\n".join(lines)
+
+
+def results_file_page() -> str:
+    """Return the page of the datasets of a results file."""
+    rows = []
+    for name, (field, meaning) in DATASETS.items():
+        declared = Rows()._asdict()[field]
+        shape = ", ".join(SIZES.get(str(size), str(size)) for size in declared.shape)
+        rows.append((f"`{name}`", f"({shape})", declared.unit, literal(meaning)))
+    lines = [
+        "# Datasets of a results file", "",
+        "[The results file](../results_file.md) explains sizes and axes.", "",
+        *table(("dataset", "shape", "unit in m-kg-s", "meaning"), rows), "",
+    ]  # fmt: skip
+    return "\n".join(lines)
 
 
 # decks ---------------------------------------------------------------------------------------------------------

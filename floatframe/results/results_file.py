@@ -48,21 +48,37 @@ RESTART = "restart"  #: group in a segment with the state of the integrator at i
 #: field of `Rows`, which declares shape and unit, and description, by the name of the dataset in the file
 DATASETS = {
     "t": ("t", "time"),
-    "position": ("r", "of the frame origins, ground axes, (n_t, n_bodies, 3)"),
-    "euler_parameters": ("p", "w, x, y, z of R_GB, (n_t, n_bodies, 4)"),
-    "q": ("q", "modal coordinates of all bodies, (n_t, n_q)"),
-    "u": ("u", "per body: velocity of the origin in ground axes, angular velocity in body axes, q_dot, (n_t, n_u)"),
-    "u_dot": ("u_dot", "rates of u, (n_t, n_u)"),
-    "w": ("w", "force (and moment) of each connection on its marker A, ground axes, (n_t, n_w)"),
+    "position": ("r", "positions of the body frame origins, ground axes"),
+    "euler_parameters": ("p", "Euler parameters (w, x, y, z) of R_GB, of length one"),
+    "q": ("q", "modal coordinates of all bodies, mass^(1/2) length"),
+    "u": (
+        "u",
+        "per body from column u0: velocity of the frame origin (3, ground axes), angular velocity (3, body axes), "
+        "rates of q",
+    ),
+    "u_dot": ("u_dot", "rates of u"),
+    "w": (
+        "w",
+        "per connection from column w0: force (3) on its marker A and, for joints that constrain angles, moment (3), "
+        "ground axes",
+    ),
     "diagnostics": (
         "diagnostics",
-        "kinetic, strain, gravity and spring energy, linear momentum (3), angular momentum "
-        "about the ground origin (3), work of point forces, energy taken by damping",
+        "kinetic, strain, gravity and spring energy; linear momentum (3); angular momentum about the ground origin "
+        "(3); work of point forces; energy dissipated by dampers and modal damping",
     ),
-    "drift": ("drift", "of each joint: distance, angle, their rates, (n_t, n_joints, 4)"),
-    "angle": ("angle", "between the frames of bodies, counted through full turns, (n_t, n_angles)"),
-    "load": ("load", "force and moment of each point force on its marker, ground axes, (n_t, n_loads, 6)"),
-    "load_case": ("load_case", "factor of each force that is a load case, (n_t, n_load_cases)"),
+    "drift": ("drift", "how far each joint is open: distance, angle, and their rates"),
+    "angle": (
+        "angle",
+        "angles of joints and of sensors between the frames of bodies, without elastic rotation, with all full turns "
+        "that the run has counted; absent without angles",
+    ),
+    "load": (
+        "load",
+        "force (3) and moment (3) of each point force on its marker as they acted, with switches by events and values "
+        "from another program; ground axes; absent without loads",
+    ),
+    "load_case": ("load_case", "factor of each load case as it acted; absent without load cases"),
 }
 
 

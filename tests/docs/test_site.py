@@ -11,12 +11,14 @@ from types import SimpleNamespace
 
 import pytest
 
+from cms.body.modal_file.schema import ENTRIES, GROUPS
 from fe_models.door import namespaces
 from fe_models.files.abaqus.keywords import PARAMETERS
 from fe_models.files.ansys.command_fields import COMMANDS
 from fe_models.files.nastran.deck.card_fields import CARDS
 from fe_models.foundation.file_kinds import KINDS
 from fe_models.foundation.parametric_file import schema_text
+from floatframe.results.results_file import DATASETS
 from tests.root import ROOT
 
 
@@ -67,7 +69,7 @@ def test_reference_pages_hold_every_command_option_and_key(tmp_path):
     (tmp_path / "reference" / "gone-file.md").write_text("old")
     reference_pages.write_pages(SimpleNamespace(srcdir=tmp_path))
     pages = {path.stem: path.read_text(encoding="utf-8") for path in (tmp_path / "reference").glob("*.md")}
-    made = {"cms-commands", "floatframe-commands", "deck-fields", "formats"}
+    made = {"cms-commands", "floatframe-commands", "deck-fields", "formats", "modal-file", "results-file"}
     assert set(pages) == made | {f"{kind}-file" for kind in KINDS}
     reduce = pages["cms-commands"].split("### cms reduce\n")[1].split("###")[0]
     assert re.search(
@@ -82,6 +84,28 @@ def test_the_page_of_deck_fields_has_every_card_that_is_read():
     page = reference_pages.fields_page()
     cards = {*CARDS, *(f"*{name}" for name in PARAMETERS), *COMMANDS}
     assert sorted(card for card in cards if f"| `{card}` |" not in page) == []
+
+
+def test_the_page_of_a_modal_file_has_every_dataset_and_attribute_in_its_group():
+    page = reference_pages.modal_file_page()
+    sections = {part.split("`", 1)[0]: part for part in page.split("\n## `")[1:]}
+    assert set(sections) == set(GROUPS)
+    rows = {
+        (f"{group.rstrip('/')}/{name}", shape)
+        for group, part in sections.items()
+        for name, shape in re.findall(r"^\| `([^`]+)` \| (\([^|]*) \| [^|]+ \| [^|]", part, re.MULTILINE)
+    }
+    assert rows == {(path, entry.shape) for path, entry in ENTRIES.items()}
+    for group, layout in GROUPS.items():
+        for name in layout.attributes:
+            assert re.search(rf"^\| `{name}` \| (?:text|integer|float) \| [^|]", sections[group], re.MULTILINE)
+    assert "| mass^(-1/2) (rows 0-2), mass^(-1/2) length^-1 (rows 3-5) |" in sections["/interfaces/<i>"]
+
+
+def test_the_page_of_a_results_file_has_every_dataset_with_named_sizes():
+    page = reference_pages.results_file_page()
+    assert re.findall(r"^\| `(\w+)` \| \(", page, re.MULTILINE) == [*DATASETS]
+    assert "| `drift` | (n_t, n_joints, 4) | m, rad, m/s, rad/s |" in page
 
 
 def test_every_key_of_every_kind_of_file_has_a_meaning_on_its_page():

@@ -45,6 +45,7 @@ FIELDS = {
         and ((own := layout.names.get(name, name)) in {each.name for each in fields(layout.holds)} | {*layout.follows})
     }
     for group, layout in GROUPS.items()
+    if layout.holds is not None
 }
 
 
@@ -89,10 +90,9 @@ def content_of(body: ReducedBody, version: int) -> Content:
             attributes[group.removesuffix("/<i>")] = {"count": len(items)}
         for k, item in enumerate(items):
             path = group.replace("<i>", str(k))
-            kinds = GROUPS[group].attributes
             attributes[path] = {
                 name: int(getattr(item, name)) if kind is bool else getattr(item, name)
-                for name, kind in kinds.items()
+                for name, (kind, _) in GROUPS[group].attributes.items()
                 if name not in GROUPS[group].if_any or getattr(item, name)
             }
             values |= {
@@ -185,7 +185,9 @@ def without_version_1(content: Content) -> Content:
 
 def item_of(contents: Contents, group: str, k: int = 0) -> Any:
     """Return the object in a group."""
-    return GROUPS[group].holds(**fields_of(contents, group, k))
+    holds = GROUPS[group].holds
+    assert holds is not None
+    return holds(**fields_of(contents, group, k))
 
 
 def items_in(contents: Contents, group: str) -> tuple[Any, ...]:
@@ -200,7 +202,7 @@ def fields_of(contents: Contents, group: str, k: int = 0) -> dict[str, Any]:
     stored = contents.content.attributes.get(path, {})
     attributes = {
         name: kind(contents.attribute(path, name, int if kind is bool else kind))
-        for name, kind in layout.attributes.items()
+        for name, (kind, _) in layout.attributes.items()
         if name not in layout.if_any or name in stored
     }
     datasets = {

@@ -1,7 +1,6 @@
 """Results on disk: what a run, a stopped run and a killed run leave."""
 
 import json
-import re
 import shutil
 import signal
 import subprocess
@@ -18,12 +17,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 from fe_models.foundation.hdf5_file import Manifest, as_attribute, write_sealed_file
 from floatframe import GeneralizedAlpha, integrate, read_results
 from floatframe.engine.compiling.counted_angles import CountedAngle
-from floatframe.engine.kernels.memory import Rows
 from floatframe.errors import ConvergenceError, ModelError, ResultsError
 from floatframe.results.head import BodyEntry, Head
 from floatframe.results.place_motion import point_motion
 from floatframe.results.recovery import interface_positions, nodal_positions
-from floatframe.results.results_file import DATASETS, KIND
+from floatframe.results.results_file import KIND
 from tests.floatframe.results.examples import SYSTEM
 from tests.root import ROOT
 
@@ -262,17 +260,6 @@ def test_a_head_that_is_no_object_is_refused_in_one_short_message(path, text):
         with pytest.raises(ResultsError) as error:
             read_results(rewritten(path, lambda values, attributes, name=name: attributes.update({name: text or " "})))
         assert len(str(error.value)) < 500
-
-
-def test_the_tables_of_the_specification_are_those_of_the_layout():
-    page = (ROOT / "docs" / "results_file.md").read_text("utf-8")
-    found = re.findall(r"^\| `(\w+)` \| \(([^|]*)\) \| ([^|]*)\|", page, re.MULTILINE)
-    names = {"angles": "n_angles", "loads": "n_loads", "body loads": "n_load_cases", "n_c": "n_joints"}
-    declared = {name: Rows()._asdict()[field] for name, (field, _) in DATASETS.items()}
-    shapes = {name: ", ".join(names.get(str(n), str(n)) for n in each.shape) for name, each in declared.items()}
-    assert {name: (shape, unit.strip()) for name, shape, unit in found} == {
-        name: (shapes[name], each.unit) for name, each in declared.items()
-    }
 
 
 @pytest.mark.parametrize("record", [Head, BodyEntry, CountedAngle])
