@@ -35,7 +35,7 @@ from floatframe.engine.initial_conditions.newton_equations import (
     set_iterate,
     solve,
 )
-from floatframe.engine.kernels.work import Work
+from floatframe.engine.kernels.work import Work, vectors_of_end
 from floatframe.errors import ConvergenceError
 from floatframe.model.joints.rows import is_held
 from floatframe.model.state import State
@@ -203,8 +203,8 @@ def rigid_equations(compiled: CompiledSystem, work: Work) -> RigidEquations:
         i, c, o = int(model.markers.body[m]), int(model.markers.connection[m]), int(model.markers.x0[m])
         n, size, w0 = 6 + int(model.bodies.n_q[i]), int(model.connections.size[c]), int(model.connections.w0[c])
         R = work.state.R[i]
-        column = work.solver.J_column[6 * o : 6 * (o + n)].reshape(2, 3, n)[:, :, :6]
-        row = work.solver.J_row[12 * o : 12 * (o + n)].reshape(4, 3, n)[:, :, :6]
+        column = vectors_of_end(work.solver.J_column, 2, o, n)[:, :, :6]
+        row = vectors_of_end(work.solver.J_row, 4, o, n)[:, :, :6]
         u = slice(6 * i, 6 * i + 6)
         carried = model.markers.sign[m] * (R @ column)
         for part, place in ((0, int(model.markers.force[m])), (1, int(model.markers.moment[m]))):

@@ -7,6 +7,7 @@ import numpy as np
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.kernels.model import marker_shapes
 from floatframe.model.forces import PointForce
 from floatframe.model.system import System
 
@@ -36,14 +37,12 @@ class Load:
 def loads_on_interfaces(system: System, body: int) -> tuple[list[Wrench], list[Load]]:
     """Return the wrench indices of connections on the interfaces of a flexible body, and the point forces on them."""
     model, reduced = compiled_system(system).model, system.bodies[body].moved  # type: ignore[union-attr]
-    n = reduced.n_q
     forces = [force for force in system.forces if isinstance(force, PointForce)]
     load_of = {int(m): k for k, m in enumerate(model.loads.marker)}
     wrenches, loads = [], []
     for m in np.flatnonzero((model.markers.body == body) & (model.markers.psi0 >= 0)):
-        o = int(model.markers.psi0[m])
-        own = model.markers.psi[o : o + 6 * n].reshape(6, n)
-        interface = interface_number(reduced, own, model.markers.position[m])
+        shapes = marker_shapes(model, model.markers.psi, m)
+        interface = interface_number(reduced, shapes, model.markers.position[m])
         if interface < 0:  # not at an interface: marker of a sliding joint on its line
             continue
         c = int(model.markers.connection[m])

@@ -11,7 +11,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.engine.kernels.model import MASS, STIFFNESS, Model
-from floatframe.engine.kernels.work import Work
+from floatframe.engine.kernels.work import Work, vectors_of_end
 from floatframe.model.rotations import (
     euler_parameter_product,
     euler_parameters_of_rotation_vector,
@@ -91,8 +91,8 @@ def linearized(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> 
     ):
         n, size = n_of[i], sizes[c]
         R = work.state.R[i]  # rotates each three rows of the following columns
-        column = work.solver.J_column[6 * o : 6 * (o + n)].reshape(2, 3, n)
-        row = work.solver.J_row[12 * o : 12 * (o + n)].reshape(4, 3, n)
+        column = vectors_of_end(work.solver.J_column, 2, o, n)
+        row = vectors_of_end(work.solver.J_row, 4, o, n)
         w0, u0 = w0_of[c], u0_of[i]
         carried = markers.sign[m] * (R @ column).reshape(6, n)
         for part, place in ((0, force), (3, moment)):
@@ -100,8 +100,7 @@ def linearized(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> 
                 J_parts.append((carried[part : part + 3], w0 + place, u0))
         G_parts.append((work.connections.P[m, :size] @ (R @ row).reshape(12, n), w0, u0))
         if accelerated >= 0:
-            o = int(markers.a0[m])
-            row_a = work.solver.J_a[6 * o : 6 * (o + n)].reshape(2, 3, n)
+            row_a = vectors_of_end(work.solver.J_a, 2, int(markers.a0[m]), n)
             G_parts.append((work.connections.P_a[accelerated, :size] @ (R @ row_a).reshape(6, n), w0, u0))
     places = enumerate(zip(sizes, w0_of, strict=False))
     V = summed([(work.connections.V[c, :size, :size], w0, w0) for c, (size, w0) in places], (n_w, n_w))

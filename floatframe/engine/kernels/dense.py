@@ -1,9 +1,20 @@
 """Small dense matrices: views of flat arrays, LU factorisation with partial pivoting, solves. Row-major, in place."""
 
-from floatframe.engine.kernels.compiler.compilation import matrix_loops, view
+from floatframe.engine.kernels.compiler.compilation import inner, matrix_loops, view
 from floatframe.engine.kernels.vector import add, put, scaled, sub, vector
 
-__all__ = ["add_products", "flat", "lu_factor", "lu_solve", "lu_solve_columns", "matrix_at", "rows_of", "six_columns"]
+__all__ = [
+    "add_products",
+    "flat",
+    "lu_factor",
+    "lu_solve",
+    "lu_solve_columns",
+    "matrix_at",
+    "product_of",
+    "rows_of",
+    "six_columns",
+    "subtract_product",
+]
 
 ENOUGH = 0.25  # ratio of a pivot to the largest number of its row at which the search for it ends
 
@@ -39,6 +50,26 @@ def add_products(A, x, out):
         row, y = A[k], x[k]
         for j in range(width):
             out[j] += row[j] * y
+
+
+@inner
+def product_of(A, x, out):
+    """Write the product A x into out."""
+    for r in range(A.shape[0]):
+        total = 0.0
+        for k in range(A.shape[1]):
+            total += A[r, k] * x[k]
+        out[r] = total
+
+
+@inner
+def subtract_product(A, x, out):
+    """Subtract the product A x from out."""
+    for r in range(A.shape[0]):
+        total = out[r]
+        for k in range(A.shape[1]):
+            total -= A[r, k] * x[k]
+        out[r] = total
 
 
 @matrix_loops

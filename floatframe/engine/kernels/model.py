@@ -53,6 +53,7 @@ __all__ = [
     "States",
     "Stations",
     "Tapes",
+    "marker_shapes",
 ]
 
 JOINT, SPRING, BUSHING, CONTACT, COUPLER, USER_FORCE, ELEMENT = range(7)  #: values of `Connections.law`
@@ -388,3 +389,9 @@ class Model(NamedTuple):
     body_loads: BodyLoads = BodyLoads()
     angles: Angles = Angles()
     elimination: Elimination = Elimination()
+
+
+def marker_shapes(model: Model, psi: Array, m: int) -> Array:
+    """Return the shapes of marker m, (6, n_q); psi: of all markers, undeformed or of an iterate."""
+    n, first = int(model.bodies.n_q[model.markers.body[m]]), int(model.markers.psi0[m])
+    return psi[first : first + 6 * n].reshape(6, n)

@@ -10,13 +10,22 @@ and Z do not rotate with the body, so that they can be used for many steps; P, R
 import math
 
 from floatframe.engine.kernels.body import modal_number, newton_block
-from floatframe.engine.kernels.compiler.compilation import inner, small
+from floatframe.engine.kernels.compiler.compilation import inner, small, view
 from floatframe.engine.kernels.connections.connection import (
     connection_derivatives,
     constraint_rates,
     write_velocity_gaps,
 )
-from floatframe.engine.kernels.dense import lu_factor, lu_solve, lu_solve_columns, rows_of, six_columns
+from floatframe.engine.kernels.dense import (
+    lu_factor,
+    lu_solve,
+    lu_solve_columns,
+    matrix_at,
+    product_of,
+    rows_of,
+    six_columns,
+    subtract_product,
+)
 from floatframe.engine.kernels.evaluation import linearize
 from floatframe.engine.kernels.model import STIFFNESS
 from floatframe.engine.kernels.vector import add, copy, dot, put, put_sum, scaled, sub, turned, turned_back, vector
@@ -102,21 +111,48 @@ def add_motion(model, work, out):
     return math.isfinite(total)
 
 
+@view
+def wrench_of(connections, x, c):
+    """Return the part of x, (n_w,), for the wrench of connection c."""
+    return x[connections.w0[c] : connections.w0[c + 1]]
+
+
+@view
+def diagonal_block(elimination, connections, solver, c):
+    """Return the diagonal block of connection c."""
+    return matrix_at(solver.blocks, elimination.diagonal[c], connections.size[c], connections.size[c])
+
+
+@view
+def lower_block(elimination, connections, solver, j, e):
+    """Return block (i, j), where connection i = after[e] is eliminated after j."""
+    rows = connections.size[elimination.after[e]]
+    return matrix_at(solver.blocks, elimination.after_lower[e], rows, connections.size[j])
+
+
+@view
+def upper_block(elimination, connections, solver, j, e):
+    """Return block (j, i), where connection i = after[e] is eliminated after j."""
+    columns = connections.size[elimination.after[e]]
+    return matrix_at(solver.blocks, elimination.after_upper[e], connections.size[j], columns)
+
+
 @inner
 def assemble(model, work, c_k):
     """Assemble the block matrix of the connections at the iterate."""
-    s = work.solver.blocks
-    s[:] = 0.0
+    work.solver.blocks[:] = 0.0
     for c in range(model.connections.size.shape[0]):
         connection_derivatives(model, work, c, c_k)
-        size, o = model.connections.size[c], model.elimination.diagonal[c]
-        for r in range(size):
-            for k in range(size):
-                s[o + r * size + k] = work.connections.V[c, r, k]
+        own = diagonal_block(model.elimination, model.connections, work.solver, c)
+        for r in range(own.shape[0]):
+            for k in range(own.shape[1]):
+                own[r, k] = work.connections.V[c, r, k]
     for p in range(model.elimination.pair_row.shape[0]):
         a, b = model.elimination.pair_row[p], model.elimination.pair_column[p]
         c, d = model.markers.connection[a], model.markers.connection[b]
-        rows, columns, o = model.connections.size[c], model.connections.size[d], model.elimination.pair_block[p]
+        own = matrix_at(
+            work.solver.blocks, model.elimination.pair_block[p], model.connections.size[c], model.connections.size[d]
+        )
         R, P, Z, sign = (
             work.state.R[model.markers.body[a]],
             work.connections.P[a],
@@ -124,7 +160,7 @@ def assemble(model, work, c_k):
             model.markers.sign[b],
         )
         n_motion = 12 if model.connections.has_rates[c] else 6
-        for r in range(rows):
+        for r in range(own.shape[0]):
             by_force, by_moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
             for part in range(0, n_motion, 3):
                 if P[r, part] != 0.0 or P[r, part + 1] != 0.0 or P[r, part + 2] != 0.0:
@@ -133,19 +169,16 @@ def assemble(model, work, c_k):
                         by_force = add(by_force, scaled(along[k], Z[part + k]))
                         by_moment = add(by_moment, scaled(along[k], Z[part + k, 3:]))
             if model.markers.force[b] >= 0:
-                put_sum(s, o + r * columns + model.markers.force[b], scaled(sign, turned(R, by_force)))
+                put_sum(own[r], model.markers.force[b], scaled(sign, turned(R, by_force)))
             if model.markers.moment[b] >= 0:
-                put_sum(s, o + r * columns + model.markers.moment[b], scaled(sign, turned(R, by_moment)))
+                put_sum(own[r], model.markers.moment[b], scaled(sign, turned(R, by_moment)))
             if model.markers.accelerated[a] >= 0:
-                add_accelerated(model, work, p, r, s, o + r * columns)
+                add_accelerated(model, work, p, r, own[r])
 
 
 @inner
-def add_accelerated(model, work, p, r, s, place):
-    """Add the effect of the pair's other wrench on row r through the acceleration of the first marker.
-
-    place: index in the array of blocks s at which the row of the block begins.
-    """
+def add_accelerated(model, work, p, r, own):
+    """Add the effect of the pair's other wrench on row r through the acceleration of the first marker to `own`."""
     a, b, row = model.elimination.pair_row[p], model.elimination.pair_column[p], work.solver.row
     R, P_a = work.state.R[model.markers.body[a]], work.connections.P_a[model.markers.accelerated[a]]
     Z_a = work.solver.Z_a[p]
@@ -157,74 +190,52 @@ def add_accelerated(model, work, p, r, s, place):
             x = (0.0, 0.0, 0.0)
             for k in range(6):
                 x = add(x, scaled(row[k], Z_a[k, part:]))
-            put_sum(s, place + w_part, scaled(model.markers.sign[b], turned(R, x)))
+            put_sum(own, w_part, scaled(model.markers.sign[b], turned(R, x)))
 
 
 @inner
 def factorize_connections(elimination, connections, solver):
     """Factorise the connections in the planned order; return the connection with a singular block, or -1."""
-    s = solver.blocks
     for step in range(elimination.order.shape[0]):
         j = elimination.order[step]
-        n, o = connections.size[j], elimination.diagonal[j]
-        D = s[o : o + n * n].reshape((n, n))
-        pivot = solver.block_pivot[connections.w0[j] : connections.w0[j + 1]]
+        D, pivot = diagonal_block(elimination, connections, solver, j), wrench_of(connections, solver.block_pivot, j)
         if not lu_factor(D, pivot):
             return j
         first, last = elimination.after0[step], elimination.after0[step + 1]
         for e in range(first, last):
-            m = connections.size[elimination.after[e]]
-            o = elimination.after_upper[e]
-            lu_solve_columns(D, pivot, s[o : o + n * m].reshape((n, m)))
+            lu_solve_columns(D, pivot, upper_block(elimination, connections, solver, j, e))
         target = elimination.update0[step]
         for e in range(first, last):
-            rows = connections.size[elimination.after[e]]
-            L = s[elimination.after_lower[e] : elimination.after_lower[e] + rows * n].reshape((rows, n))
+            L = lower_block(elimination, connections, solver, j, e)
             for f in range(first, last):
-                columns = connections.size[elimination.after[f]]
-                U = s[elimination.after_upper[f] : elimination.after_upper[f] + n * columns].reshape((n, columns))
-                o = elimination.update[target]
+                U = upper_block(elimination, connections, solver, j, f)
+                own = matrix_at(solver.blocks, elimination.update[target], L.shape[0], U.shape[1])
                 target += 1
-                for r in range(rows):
-                    for k in range(columns):
+                for r in range(own.shape[0]):
+                    for k in range(own.shape[1]):
                         total = 0.0
-                        for j_ in range(n):
-                            total += L[r, j_] * U[j_, k]
-                        s[o + r * columns + k] -= total
+                        for i in range(U.shape[0]):
+                            total += L[r, i] * U[i, k]
+                        own[r, k] -= total
     return -1
 
 
 @inner
 def solve_connections(elimination, connections, solver):
     """Overwrite mu, which contains the right side, with the solution."""
-    s, mu = solver.blocks, solver.mu
     for step in range(elimination.order.shape[0]):
         j = elimination.order[step]
-        n, o = connections.size[j], elimination.diagonal[j]
-        own = mu[connections.w0[j] : connections.w0[j + 1]]
-        lu_solve(
-            s[o : o + n * n].reshape((n, n)),
-            solver.block_pivot[connections.w0[j] : connections.w0[j + 1]],
-            own,
-        )
+        D, own = diagonal_block(elimination, connections, solver, j), wrench_of(connections, solver.mu, j)
+        lu_solve(D, wrench_of(connections, solver.block_pivot, j), own)
         for e in range(elimination.after0[step], elimination.after0[step + 1]):
-            i = elimination.after[e]
-            o = elimination.after_lower[e]
-            for r in range(connections.size[i]):
-                total = mu[connections.w0[i] + r]
-                for k in range(n):
-                    total -= s[o + r * n + k] * own[k]
-                mu[connections.w0[i] + r] = total
+            other = wrench_of(connections, solver.mu, elimination.after[e])
+            subtract_product(lower_block(elimination, connections, solver, j, e), own, other)
     for step in range(elimination.order.shape[0] - 1, -1, -1):
         j = elimination.order[step]
+        own = wrench_of(connections, solver.mu, j)
         for e in range(elimination.after0[step], elimination.after0[step + 1]):
-            i = elimination.after[e]
-            o, columns = elimination.after_upper[e], connections.size[i]
-            for r in range(connections.size[j]):
-                total = mu[connections.w0[j] + r]
-                for k in range(columns):
-                    total -= s[o + r * columns + k] * mu[connections.w0[i] + k]
-                mu[connections.w0[j] + r] = total
+            other = wrench_of(connections, solver.mu, elimination.after[e])
+            subtract_product(upper_block(elimination, connections, solver, j, e), other, own)
 
 
 @inner
@@ -233,16 +244,10 @@ def take_accelerated(model, work, m, n, y, mu):
     c, o, motion = model.markers.connection[m], model.markers.a0[m], work.solver.motion
     R, P_a = work.state.R[model.markers.body[m]], work.connections.P_a[model.markers.accelerated[m]]
     J_a = rows_of(work.solver.J_a, 6, o, n)
-    for r in range(6):
-        total = 0.0
-        for k in range(n):
-            total += J_a[r, k] * y[k]
-        motion[r] = total
+    product_of(J_a, y, motion)
     for part in range(0, 6, 3):
         put(motion, part, turned(R, motion[part:]))
-    for r in range(model.connections.size[c]):
-        for k in range(6):
-            mu[model.connections.w0[c] + r] -= P_a[r, k] * motion[k]
+    subtract_product(P_a[: model.connections.size[c]], motion, wrench_of(model.connections, mu, c))
 
 
 @inner
@@ -449,11 +454,11 @@ def share_reactions(model, work, c_k):
     if not assemble_masses(model, work, c_k):
         return False
     for c in range(connections.size.shape[0]):
-        size, o = connections.size[c], model.elimination.diagonal[c]
-        for r in range(size):
+        own = diagonal_block(model.elimination, connections, solver, c)
+        for r in range(own.shape[0]):
             if rows.soft[connections.w0[c] + r] > 0.0:
-                for k in range(size):
-                    solver.blocks[o + r * size + k] += (SOFTER - 1.0) * work.connections.V[c, r, k]
+                for k in range(own.shape[1]):
+                    own[r, k] += (SOFTER - 1.0) * work.connections.V[c, r, k]
                     work.connections.V[c, r, k] *= SOFTER
     if factorize_connections(model.elimination, connections, solver) >= 0:
         return False

@@ -48,6 +48,7 @@ __all__ = [
     "Work",
     "new_work",
     "sizes_of",
+    "vectors_of_end",
 ]
 
 n_x, n_most, most_rows = (Size(name) for name in ("n_x", "n_most", "most_rows"))
@@ -334,6 +335,15 @@ class Work(NamedTuple):
     solver: Solver = Solver()
     counted: Counted = Counted()
     past: Past = Past()
+
+
+def vectors_of_end(stored: Array, n_vectors: int, first: int, n: int) -> Array:
+    """Return the derivatives of vectors of a marker by the n unknowns of its body, (n_vectors, 3, n).
+
+    stored: `J_row`, `J_column` or `J_a` of the solver; first: x0 or a0 of the marker.
+    """
+    width = 3 * n_vectors
+    return stored[width * first : width * (first + n)].reshape(n_vectors, 3, n)
 
 
 def sizes_of(model: Model) -> dict[str, int]:

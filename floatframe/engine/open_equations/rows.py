@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.engine.initial_conditions.newton_equations import summed
 from floatframe.engine.kernels.model import Model
-from floatframe.engine.kernels.work import Work
+from floatframe.engine.kernels.work import Work, vectors_of_end
 from floatframe.model.joints.rows import is_held
 
 __all__ = ["End", "RowParts", "Structure", "row_parts", "structure_of"]
@@ -119,8 +119,8 @@ def row_parts(structure: Structure, model: Model, work: Work) -> RowParts:
     G, J = [], []
     for end in structure.ends:
         R, n = work.state.R[end.body], end.n
-        row = work.solver.J_row[12 * end.x0 : 12 * (end.x0 + n)].reshape(4, 3, n)
-        column = work.solver.J_column[6 * end.x0 : 6 * (end.x0 + n)].reshape(2, 3, n)
+        row = vectors_of_end(work.solver.J_row, 4, end.x0, n)
+        column = vectors_of_end(work.solver.J_column, 2, end.x0, n)
         own = work.connections.P[end.marker, : end.size] @ (R @ row).reshape(12, n)
         own[:, :3] = own[:, :3] @ R.T
         carried = R @ column

@@ -6,7 +6,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import IntArray
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
-from floatframe.engine.kernels.model import COUPLER, ELEMENT, JOINT, USER_FORCE, Model
+from floatframe.engine.kernels.model import COUPLER, ELEMENT, JOINT, USER_FORCE, Model, marker_shapes
 from floatframe.engine.structure_preserving.bodies import CentralBody, central_bodies
 from floatframe.errors import ModelError
 from floatframe.model.joints.rows import is_held_velocity, kind_of
@@ -52,11 +52,10 @@ class DiscreteSystem:
 
     def turns(self, m: int) -> bool:
         """Whether marker m rotates relative to its body."""
-        markers, i = self.model.markers, int(self.model.markers.body[m])
-        if i < 0:
+        markers = self.model.markers
+        if markers.body[m] < 0 or markers.psi0[m] < 0:
             return False
-        n, first = self.bodies[i].n, int(markers.psi0[m])
-        return bool(markers.bend0[m] >= 0 or (first >= 0 and markers.psi[first + 3 * n : first + 6 * n].any()))
+        return bool(markers.bend0[m] >= 0 or marker_shapes(self.model, markers.psi, m)[3:].any())
 
 
 def discrete_system(system: System, scheme: str) -> DiscreteSystem:

@@ -5,6 +5,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.markers import MarkerData, joint_markers, marker_pose, n_q_of
 from floatframe.engine.compiling.system import CompiledSystem
+from floatframe.engine.kernels.model import marker_shapes
 from floatframe.engine.kernels.work import Work
 from floatframe.model.joints import SlidingJoint
 from floatframe.model.joints.rows import RelativePlace
@@ -62,11 +63,10 @@ def sliding_row(compiled: CompiledSystem, work: Work, k: int, marker_b: MarkerDa
     model = compiled.model
     m = int(model.lines.marker[k])
     i = int(model.markers.body[m])
-    n, first = int(model.bodies.n_q[i]), int(model.markers.psi0[m])
     n_0, slope = work.lines.n_0[k], work.lines.slope[k]
     row = np.zeros(int(model.bodies.u0[-1]))
-    psi = work.markers.psi[first : first + 3 * n].reshape(3, n)
-    of_a = work.state.R[i] @ np.hstack([np.eye(3), -tilde(work.markers.rho[m]), psi])
+    shapes = marker_shapes(model, work.markers.psi, m)
+    of_a = work.state.R[i] @ np.hstack([np.eye(3), -tilde(work.markers.rho[m]), shapes[:3]])
     row[int(model.bodies.u0[i]) : int(model.bodies.u0[i + 1])] -= n_0 @ of_a / slope
     if marker_b.body >= 0:
         of_b = marker_jacobian(compiled, work, marker_b)[:3]

@@ -7,6 +7,7 @@
 from floatframe.engine.kernels.body import newton_block
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.connection import constraint_rates
+from floatframe.engine.kernels.dense import matrix_at
 from floatframe.engine.kernels.evaluation import evaluate, linearize
 from floatframe.engine.kernels.generalized_alpha import load_state, write_row
 from floatframe.engine.kernels.schur import add_motion, correction, factorize_system
@@ -30,11 +31,11 @@ def close_velocities(model, work, discrete):
         return True
     linearize(model, work, 1.0, 0.0, 0.0)
     for i in range(model.bodies.kind.shape[0]):
-        n, first = model.bodies.n_q[i], discrete.weighted0[i]
-        H = newton_block(model, work, i)
+        n, H = model.bodies.n_q[i], newton_block(model, work, i)
+        weighted = matrix_at(discrete.weighted, discrete.weighted0[i], n, n)
         for k in range(n):
             for j in range(n):
-                H[6 + k, 6 + j] += discrete.weighted[first + k * n + j]
+                H[6 + k, 6 + j] += weighted[k, j]
     if not factorize_system(model, work):
         return False
     work.bodies.residual[:] = 0.0

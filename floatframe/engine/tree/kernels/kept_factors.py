@@ -21,6 +21,7 @@ import math
 
 from floatframe.engine.kernels.body import newton_block
 from floatframe.engine.kernels.compiler.compilation import inner, loops, matrix_loops, view
+from floatframe.engine.kernels.dense import matrix_at
 from floatframe.engine.kernels.evaluation import tangent_of_body
 from floatframe.engine.kernels.vector import (
     add,
@@ -104,7 +105,13 @@ def factorize_poses(model, work, tree, joints, tangent, c_d, c_k):
 def front(tree, tangent, i):
     """Return the frontal matrix of body i, (n_l + 6, n_l + 6)."""
     size = tree.s0[i + 1] - tree.s0[i] + 6
-    return tangent.front[tree.front0[i] : tree.front0[i + 1]].reshape((size, size))
+    return matrix_at(tangent.front, tree.front0[i], size, size)
+
+
+@view
+def right_side(tree, tangent, i):
+    """Return z of body i, (n_l + 6,)."""
+    return tangent.z[tree.s0[i] + 6 * i : tree.s0[i + 1] + 6 * i + 6]
 
 
 @loops
@@ -265,7 +272,7 @@ def solve_kept(model, tree, joints, tangent, c_k):
     for place in range(tree.order.shape[0] - 1, -1, -1):
         i = tree.order[place]
         n_l, n, parent = tree.s0[i + 1] - tree.s0[i], model.bodies.n_q[i], tree.parent[i]
-        z = tangent.z[tree.s0[i] + 6 * i : tree.s0[i + 1] + 6 * i + 6]
+        z = right_side(tree, tangent, i)
         for k in range(n):  # x already contains the contributions of children
             z[k] = x[tree.m0[i] + k] - c_k * joints.residual[tree.m0[i] + k]
         for s in range(tree.s0[i], tree.m0[i]):
@@ -283,7 +290,7 @@ def solve_kept(model, tree, joints, tangent, c_k):
     for place in range(tree.order.shape[0]):
         i = tree.order[place]
         n_l, n, parent = tree.s0[i + 1] - tree.s0[i], model.bodies.n_q[i], tree.parent[i]
-        z = tangent.z[tree.s0[i] + 6 * i : tree.s0[i + 1] + 6 * i + 6]
+        z = right_side(tree, tangent, i)
         Y, held = z[n_l:], tangent.Y[i]
         for r in range(6):
             Y[r] = 0.0

@@ -12,7 +12,7 @@ projection, of the kinematics, and of forces that are fixed in body axes or grou
 from floatframe.engine.kernels.body import moved_inertia, newton_block
 from floatframe.engine.kernels.compiler.compilation import inner, small
 from floatframe.engine.kernels.connections.connection import connection_derivatives
-from floatframe.engine.kernels.dense import matrix_at
+from floatframe.engine.kernels.dense import matrix_at, product_of
 from floatframe.engine.kernels.evaluation import tangent_of_body
 from floatframe.engine.kernels.marker import bent_rate
 from floatframe.engine.kernels.vector import (
@@ -151,16 +151,6 @@ def of_body(model, work, joints, tangent, i, c_m, c_d, c_k):
 def unit_of(e, first):
     """Return the component of the unit jet e that begins at index `first`."""
     return 1.0 if e == first else 0.0, 1.0 if e == first + 1 else 0.0, 1.0 if e == first + 2 else 0.0
-
-
-@inner
-def product_of(A, x, out):
-    """Write the product A x into out."""
-    for r in range(A.shape[0]):
-        total = 0.0
-        for k in range(A.shape[1]):
-            total += A[r, k] * x[k]
-        out[r] = total
 
 
 @inner

@@ -12,7 +12,7 @@ Sources: Walker & Orin (1982); Featherstone (2008), chapter 6.
 
 from floatframe.engine.kernels.body import block, body_forces, column, coupling, modal_block, moved_inertia
 from floatframe.engine.kernels.compiler.compilation import loops, small, view
-from floatframe.engine.kernels.dense import rows_of
+from floatframe.engine.kernels.dense import matrix_at, rows_of
 from floatframe.engine.kernels.model import C2, MASS
 from floatframe.engine.kernels.vector import (
     add,
@@ -55,7 +55,7 @@ __all__ = [
 def body_matrix(nodes, work, k):
     """Return H of node k's flexible body, (6 + n, 6 + n), as a view."""
     n = 6 + nodes.n_q[k]
-    return work.H[nodes.h0[k] : nodes.h0[k + 1]].reshape((n, n))
+    return matrix_at(work.H, nodes.h0[k], n, n)
 
 
 @small

@@ -13,7 +13,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
-from floatframe.engine.kernels.model import Model
+from floatframe.engine.kernels.model import Model, marker_shapes
 from floatframe.engine.kernels.records import filled
 from floatframe.engine.tree.kernels.tree import Tree
 from floatframe.engine.tree.recursion.nodes import FIXED, NO_MARKER, ROTATION, SCREW, TRANSLATION, Nodes
@@ -262,14 +262,15 @@ def marker_shape(compiled: CompiledSystem, m: int) -> MarkerShape:
     markers, bodies = compiled.model.markers, compiled.model.bodies
     if m < 0:
         return MarkerShape(ZERO, np.eye(3))
-    i, start = int(markers.body[m]), int(markers.psi0[m])
-    if i < 0 or start < 0:
+    i = int(markers.body[m])
+    if i < 0 or markers.psi0[m] < 0:
         return MarkerShape(markers.position[m], markers.triad[m])
     n, first = int(bodies.n_q[i]), int(markers.bend0[m])
     bend = None
     if first >= 0:
         bend = np.moveaxis(markers.bend[first : first + 6 * n * n].reshape(n, 6, n), 0, 2)
-    return MarkerShape(markers.position[m], markers.triad[m], markers.psi[start : start + 6 * n].reshape(6, n), bend)
+    shapes = marker_shapes(compiled.model, markers.psi, m)
+    return MarkerShape(markers.position[m], markers.triad[m], shapes, bend)
 
 
 def zero_rotation_of(system: System, compiled: CompiledSystem, tree: Tree, i: int) -> Array:
