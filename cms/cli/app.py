@@ -82,7 +82,7 @@ def run_command(
     if read_toml(file, JobError).get("kind", "job") == "correlation":
         if set_values:
             raise JobError(f'{file}: kind = "correlation": --set belongs to jobs')
-        correlate_command(file, output)
+        correlate_command(file, [] if output is None else [output])
         return
     reduce_command([file], output, set_values=set_values)
 
@@ -512,7 +512,10 @@ def compare_command(
 @guarded
 def correlate_command(
     file: Annotated[Path, typer.Argument(help="Correlation file (TOML), see docs/test_and_model.md.")],
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Report: .html or .pdf.")] = None,
+    outputs: Annotated[
+        list[Path],
+        typer.Option("--output", "-o", help="A .html, .pdf or .json file, or a table (.csv, ...); repeatable."),
+    ] = [],  # noqa: B006
     updated_job: Annotated[
         Path | None, typer.Option(help="Job with the updated values to write, beside the job.")
     ] = None,
@@ -530,7 +533,7 @@ def correlate_command(
     """
     from cms.cli.verdicts.correlate import CorrelateRequest, run_correlate
 
-    run_correlate(CorrelateRequest(file, output, updated_job, json))
+    run_correlate(CorrelateRequest(file, tuple(outputs), updated_job, json))
 
 
 @guarded

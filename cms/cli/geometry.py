@@ -12,6 +12,7 @@ import typer
 from cms.cli.console import print_table, say, stages, vector_words
 from cms.cli.info import MESH_SIGNS, error_percent
 from cms.cli.outputs import output_file
+from cms.cli.verdicts.check import print_records
 from cms.errors import JobError
 
 if TYPE_CHECKING:
@@ -75,6 +76,8 @@ def run_converge(request: ConvergeRequest, changes: Mapping[str, Any]) -> None:
             with clock("draw"):
                 draw_oversize(estimate, request.error, request.output)
     record = record_of_estimate(estimate, request) | ({} if result is None else record_of_convergence(result, request))
+    verdict = estimate.judged(request.error) if result is None else result.judged(request.error)
+    record["records"] = [verdict.as_dict()]
     if request.as_json:
         typer.echo(json.dumps(record, indent=2))
         return
@@ -82,7 +85,8 @@ def run_converge(request: ConvergeRequest, changes: Mapping[str, Any]) -> None:
         print_estimate(record)
     else:
         print_convergence(result, record)
-    print_proposal(record)
+    say(f"from the stress on this mesh alone: {record['mesh_method']}")
+    print_records("Mesh", estimate.body.name, (verdict,))
     if request.output is not None:
         say(f"wrote {request.output}")
 
@@ -170,18 +174,6 @@ def print_convergence(result: "MeshConvergence", record: dict[str, Any]) -> None
         say(f"cells of first order: no error is taken below the {100 * result.first_order:.2g} % of the mesh report")
     if (result.change < 0).any():
         say("some frequencies rise with refinement: the meshes do not yet show the same geometry; refine")
-
-
-def print_proposal(record: dict[str, Any]) -> None:
-    """Print how the errors were estimated, and the element size for the wanted error."""
-    say(f"from the stress on this mesh alone: {record['mesh_method']}")
-    if record["size_factor"] is None:
-        return
-    size = f", size {record['sizes'][1] * record['size_factor']:.3g}" if "sizes" in record else ""
-    say(
-        f"for an error of {100 * record['wanted_error']:.2g} %: elements {record['size_factor']:.2g} times as large"
-        f"{size}, if the error falls with the size to the power {record['rate']:.2g}"
-    )
 
 
 # `cms faces`: the faces of a CAD file as a list and a picture, so that interfaces can name them -----------------------

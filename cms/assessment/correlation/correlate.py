@@ -12,7 +12,7 @@ from cms.assessment.correlation.measured import MeasuredModes
 from cms.assessment.correlation.model_modes import ModelModes, at_rows
 from cms.assessment.correlation.points import Placement, PointPairs, pair_points
 from cms.assessment.quality.of_reduction.frequencies import mac
-from cms.assessment.quality.record import plain
+from cms.assessment.quality.record import QualityRecord, information, judge, plain, worst
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.documents.table import Table, Tabular
 from fe_models.foundation.presentation import presented
@@ -198,6 +198,27 @@ class Correlation(Tabular):
         names = ("measured", "measured frequency", "computed", "computed frequency", "error", "MAC")
         return Table.of_rows(names, rows, {"measured frequency": "Hz", "computed frequency": "Hz"})
 
+    @property
+    def records(self) -> tuple[QualityRecord, ...]:
+        """Verdicts about partners, frequencies, shapes and the orthogonality of the measured shapes."""
+        paired, n = {pair.measured for pair in self.pairs}, self.measured.n_modes
+        alone = ", ".join(str(k + 1) for k in range(n) if k not in paired)
+        reason = f"{len(paired)} of {n} measured modes have a partner" + (f", not {alone}" if alone else "")
+        found = [judge("test-partners", 1 - len(paired) / n, reason)]
+        if self.pairs:
+            errors, macs = self.errors, np.array([pair.mac for pair in self.pairs])
+            k, j = int(np.abs(errors).argmax()), int(macs.argmin())
+            reason = f"the model is {100 * errors[k]:+.2g} % off at measured mode {self.pairs[k].measured + 1}"
+            found.append(judge("test-frequency", abs(errors[k]), reason, {"error": errors}))
+            reason = f"least MAC {macs[j]:.3f}, of measured mode {self.pairs[j].measured + 1}"
+            found.append(judge("test-mac", 1 - macs[j], reason, {"mac": macs}))
+        if self.orthogonality is None:
+            return (*found, information("test-orthogonality", f"not known: {self.why_not}"))
+        off = np.abs(self.orthogonality - np.diag(np.diag(self.orthogonality)))
+        k, j = (int(index) for index in np.unravel_index(off.argmax(), off.shape))
+        modes = f"measured modes {self.pairs[k].measured + 1} and {self.pairs[j].measured + 1}"
+        return (*found, judge("test-orthogonality", off[k, j], f"largest coupling {off[k, j]:.3f}, of {modes}"))
+
     def point_comac(self) -> list[tuple[int, str, float]]:
         """Return point, node and the smallest COMAC over the directions, worst point first."""
         if not self.comac.size:
@@ -232,6 +253,8 @@ class Correlation(Tabular):
             "orthogonality": plain(self.orthogonality),
             "cross_orthogonality": plain(self.cross_orthogonality),
             "orthogonality_note": self.why_not,
+            "verdict": worst(self.records),
+            "records": [record.as_dict() for record in self.records],
         }  # fmt: skip
 
 

@@ -1,8 +1,11 @@
 """All thresholds of the quality checks, each defined once."""
 
 from dataclasses import dataclass
+from typing import Literal
 
-__all__ = ["LIMITS", "Limit"]
+__all__ = ["LIMITS", "Limit", "Verdict"]
+
+Verdict = Literal["pass", "warn", "fail", "info"]
 
 
 @dataclass(frozen=True)
@@ -13,6 +16,14 @@ class Limit:
     tolerance: float | None  #: largest value that passes; None: the value is only information
     failing: float | None  #: value above which the verdict is "fail"; between both it is "warn"; None: never fails
     action: str  #: remedy if the value does not pass
+
+    def verdict(self, value: float) -> Verdict:
+        """Return the verdict about a value; NaN fails."""
+        if self.tolerance is None:
+            return "info"
+        if value <= self.tolerance:
+            return "pass"
+        return "fail" if self.failing is not None and not value <= self.failing else "warn"
 
 
 REDUCE_AGAIN = "reduce the body again; the file contradicts itself"
@@ -254,6 +265,24 @@ LIMITS: dict[str, Limit] = {
     "mesh-error": Limit(
         "lowest frequencies too high because of the mesh, estimated", 0.02, None,
         "mesh finer; if the cells are of first order, cells of second order also help",
+    ),
+    # Measured modes against a model --------------------------------------------------------------------------------
+    "test-partners": Limit(
+        "share of the measured modes without a partner in the model", 0.0, 0.99,
+        "compare the shape with the likest one of the model: a point may be placed wrongly, a part of the model be "
+        "missing, or the window of the pairs be too narrow",
+    ),
+    "test-frequency": Limit(
+        "frequencies of the model against the test", 0.02, 0.05,
+        "let the test update the job ([update]), or check masses, joints and supports of both",
+    ),
+    "test-mac": Limit(
+        "measured shapes that the model does not have (1 - MAC)", 0.1, 0.3,
+        "look at the points with the least COMAC: a sensor may be rotated or exchanged, or the model wrong there",
+    ),
+    "test-orthogonality": Limit(
+        "coupling of two measured shapes by the mass of the model", 0.1, None,
+        "measure at more points, or separate close modes: the measured shapes are mixed",
     ),
     "left-out": Limit(
         "kinds of cards of the deck that carry mass or stiffness and are left out", 0.0, None,

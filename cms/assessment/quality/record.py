@@ -5,14 +5,14 @@ Tests, command line, reports and plots read the same record; `LIMITS` defines al
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from cms.assessment.quality.errors import QualityError
-from cms.assessment.quality.limits import LIMITS
+from cms.assessment.quality.limits import LIMITS, Verdict
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
@@ -20,7 +20,6 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["VERDICTS", "QualityRecord", "Verdict", "has_failed", "information", "judge", "plain", "worst"]
 
-Verdict = Literal["pass", "warn", "fail", "info"]
 VERDICTS: tuple[Verdict, ...] = ("info", "pass", "warn", "fail")  #: verdicts in order of severity
 
 
@@ -82,14 +81,17 @@ class QualityRecord:
 
 
 def judge(
-    name: str, value: float, reason: str, data: Mapping[str, Any] | None = None, *, action: str | None = None
-) -> QualityRecord:
+    name: str, value: float, reason: str, data: Mapping[str, Any] | None = None, *, action: str | None = None,
+    tolerance: float | None = None,
+) -> QualityRecord:  # fmt: skip
     """Return the record of a value, with its verdict according to the limit of this name; NaN fails.
 
     Parameters
     ----------
     action
         Remedy if the value does not pass; by default the action of the limit.
+    tolerance
+        Largest value that passes, if not that of the limit.
 
     Raises
     ------
@@ -98,17 +100,9 @@ def judge(
     """
     if name not in LIMITS:
         raise QualityError(f"quality record {quoted(name)}: unknown{nearest(name, LIMITS)}")
-    limit = LIMITS[name]
+    limit = LIMITS[name] if tolerance is None else replace(LIMITS[name], tolerance=tolerance)
     value = float(value)
-    verdict: Verdict
-    if limit.tolerance is None:
-        verdict = "info"
-    elif value <= limit.tolerance:
-        verdict = "pass"
-    elif limit.failing is not None and not value <= limit.failing:
-        verdict = "fail"
-    else:
-        verdict = "warn"
+    verdict = limit.verdict(value)
     todo = "" if verdict in ("pass", "info") else (action or limit.action)
     return QualityRecord(name, limit.title, value, limit.tolerance, verdict, reason, todo, data or {})
 

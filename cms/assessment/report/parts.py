@@ -1,11 +1,14 @@
-"""Texts and symbols that the sections of a comparison share."""
+"""Texts, symbols and tables that reports share."""
+
+from collections.abc import Iterable
 
 from cms.assessment.compare.comparison import Comparison
 from cms.assessment.quality.limits import LIMITS
+from cms.assessment.quality.numbers import number
 from cms.assessment.quality.record import QualityRecord
 from cms.assessment.report.formatting import share
 from cms.assessment.report.palette import style_of
-from fe_models.foundation.documents.document import Cell, Paragraph
+from fe_models.foundation.documents.document import Cell, Paragraph, TextTable
 from fe_models.foundation.documents.html import text
 
 __all__ = [
@@ -14,6 +17,7 @@ __all__ = [
     "legend",
     "limit_words",
     "nothing_to_show",
+    "records_table",
     "sentence_case",
     "swatch",
     "verdict_cell",
@@ -25,6 +29,7 @@ MARKS = {
     "fail": "\u2715 not good enough",
     "error": "! could not be made",
 }
+WORST_FIRST = ("fail", "warn", "pass", "info")
 #: short headings of the deciding records, and descriptions of their charts
 COLUMNS = {
     "frequency-error": "free frequencies",
@@ -47,6 +52,18 @@ def verdict_cell(record: QualityRecord) -> Cell:
     """Return a table cell with the value of a record in the colour of its verdict."""
     kind = record.verdict if record.verdict != "info" else "blank"
     return Cell(share(record.value) if record.verdict != "info" else "n/a", f"n {kind}")
+
+
+def records_table(records: Iterable[QualityRecord]) -> TextTable:
+    """Return a table of records, the worst verdicts first: value, limit, finding and remedy."""
+    rows = tuple(
+        (
+            record.verdict, record.title, number(record.value), number(record.tolerance),
+            record.reason + (f". To do: {record.action}" if record.action else ""),
+        )
+        for record in sorted(records, key=lambda record: WORST_FIRST.index(record.verdict))
+    )  # fmt: skip
+    return TextTable(("verdict", "check", "value>", "limit>", "found"), rows, (0.08, 0.24, 0.09, 0.08, 0.51), 0)
 
 
 def swatch(k: int) -> tuple[str, str]:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import typer
 
 from cms.cli.console import output_path, print_table, say, stages
-from cms.cli.outputs import DOCUMENTS, output_file
+from cms.cli.outputs import DOCUMENTS, TABLES, output_files, write_outputs
+from cms.cli.verdicts.check import print_records
 
 if TYPE_CHECKING:
     from cms.assessment.correlation.correlate import Correlation
@@ -23,7 +24,7 @@ class CorrelateRequest:
     """Arguments of the command `cms correlate`."""
 
     file: Path
-    output: Path | None
+    outputs: tuple[Path, ...]
     updated: Path | None
     as_json: bool
 
@@ -33,16 +34,19 @@ def run_correlate(request: CorrelateRequest) -> None:
     from cms.assessment.correlation.errors import CorrelationError
     from cms.jobs.studies.correlation_file import correlate, read_correlation
     from cms.jobs.studies.correlation_report import correlation_document
-    from fe_models.foundation.documents.write import document_content
-    from fe_models.foundation.paths import replace_files
 
     asked = read_correlation(request.file)
+
+    def updated(_: Path) -> bytes:
+        assert asked.model.job is not None
+        assert result.update is not None
+        return updated_text(asked.model.job, result.update.parameters, result.update.values).encode()
+
     inputs = [path for path in (request.file, asked.test.file, asked.model.job, asked.model.body) if path is not None]
-    page = None
-    if request.output is not None or not request.as_json:
-        default = request.file.with_suffix(".html")
-        page = output_file(request.output, default, DOCUMENTS, CorrelationError, overwrite_of=inputs, needs_file=True)
-    job = None
+    default = () if request.as_json else (request.file.with_suffix(".html"),)
+    endings = (*DOCUMENTS, *TABLES)
+    paths = output_files(request.outputs, default, endings, CorrelationError, overwrite_of=inputs, needs_file=True)
+    others = {}
     if request.updated is not None:
         if asked.update is None or asked.model.job is None:
             raise CorrelationError("--updated-job: the file has no table [update]")
@@ -51,35 +55,25 @@ def run_correlate(request: CorrelateRequest) -> None:
             raise CorrelationError(
                 f"--updated-job {job}: expected a file beside {asked.model.job}, whose paths are relative to its folder"
             )
+        paths.append(job)
+        others[job.suffix.lower()] = updated
     with stages() as clock:
         result = correlate(asked, clock)
-    contents = {}
-    if page is not None:
-        contents[page] = document_content(correlation_document(result), page.suffix)
-    if job is not None and result.update is not None and asked.model.job is not None:
-        contents[job] = updated_text(asked.model.job, result.update.parameters, result.update.values).encode()
-    try:
-        replace_files(contents)
-    except OSError as error:
-        raise CorrelationError(f"cannot be written: {error.strerror or error}; check folder and space") from error
-    last = result.correlation if result.update is None else result.update.after
+    record, last = result.as_dict(), result.last
     if request.as_json:
-        record = {"before" if result.update else "correlation": result.correlation.as_dict()}
-        if result.update is not None:
-            record |= {"after": last.as_dict(), "update": result.update.as_dict()}
-        record["damping"] = [  # type: ignore[assignment]
-            {"kind": fit.kind, "values": fit.values.tolist(), "spread": fit.spread.tolist(), "misfit": fit.misfit}
-            for fit in result.damping
-        ]
         typer.echo(json.dumps(record, indent=2))
-        return
-    print_pairs(last, "updated model" if result.update else "model")
-    if result.update is not None:
-        print_parameters(result.update)
-    for fit in result.damping:
-        say(f"damping, {fit.kind}: {', '.join(f'{v:.4g}' for v in fit.values)}, misfit {100 * fit.misfit:.2g} %")
-    for path in contents:
-        say(f"wrote {path}")
+    else:
+        print_pairs(last, "updated model" if result.update else "model")
+        if result.update is not None:
+            print_parameters(result.update)
+        for fit in result.damping:
+            say(f"damping, {fit.kind}: {', '.join(f'{v:.4g}' for v in fit.values)}, misfit {100 * fit.misfit:.2g} %")
+        print_records("Test and model", last.model.name, last.records)
+
+    write_outputs(
+        paths, table=last.to_table, record=record, document=lambda: correlation_document(result),
+        others=others, is_quiet=request.as_json,
+    )  # fmt: skip
 
 
 def print_pairs(c: "Correlation", what: str) -> None:

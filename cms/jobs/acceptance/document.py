@@ -10,11 +10,10 @@ import numpy as np
 
 from cms.assessment.quality.body_record import body_record, body_size
 from cms.assessment.quality.errors import QualityError
-from cms.assessment.quality.numbers import number
 from cms.assessment.quality.of_body.effective_mass import DIRECTIONS, EffectiveMass
-from cms.assessment.quality.record import QualityRecord
 from cms.assessment.rendering import Scene, Surface, Triad, render_picture
 from cms.assessment.report.formatting import hertz
+from cms.assessment.report.parts import records_table
 from cms.assessment.report.png import png_of
 from cms.assessment.report.view import view_axes
 from cms.body.reduced_body import ReducedBody
@@ -143,21 +142,10 @@ def origin_part(a: Acceptance) -> Section:
 
 def checks_part(a: Acceptance) -> Section:
     """Return the part with all checks."""
-    order = {"fail": 0, "warn": 1, "pass": 2, "info": 3}
-    rows = tuple(
-        (record.verdict, record.title, number(record.value), number(record.tolerance), reason_of(record))
-        for record in sorted(a.records, key=lambda record: order[record.verdict])
-    )
     against = f"Compared with {a.compared_with}." if a.compared_with else (
         "No full model was given: frequencies, statics and responses are not compared with anything."
     )  # fmt: skip
-    table = TextTable(("verdict", "check", "value>", "limit>", "found"), rows, (0.08, 0.24, 0.09, 0.08, 0.51), 0)
-    return Section("checks", "Checks", (Paragraph(against), table))
-
-
-def reason_of(record: QualityRecord) -> str:
-    """Return the finding and the remedy."""
-    return record.reason + (f". To do: {record.action}" if record.action else "")
+    return Section("checks", "Checks", (Paragraph(against), records_table(a.records)))
 
 
 def modes_part(a: Acceptance) -> Section:

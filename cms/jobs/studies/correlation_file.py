@@ -136,6 +136,22 @@ class CorrelationResult:
     damping: tuple[DampingFit, ...]  #: fits to the measured damping ratios; empty: the test has no damping ratios
     document: dict[str, Any] | None  #: the job with updated values; None: no update
 
+    @property
+    def last(self) -> Correlation:
+        """Correlation with the updated model, or with the only one."""
+        return self.correlation if self.update is None else self.update.after
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return all results in plain types."""
+        record: dict[str, Any] = {"correlation" if self.update is None else "before": self.correlation.as_dict()}
+        if self.update is not None:
+            record |= {"after": self.last.as_dict(), "update": self.update.as_dict()}
+        record["damping"] = [
+            {"kind": fit.kind, "values": fit.values.tolist(), "spread": fit.spread.tolist(), "misfit": fit.misfit}
+            for fit in self.damping
+        ]
+        return record
+
 
 def read_correlation(path: str | Path) -> CorrelationFile:
     """Read and check a correlation file; raise `CorrelationError` with a list of all problems."""

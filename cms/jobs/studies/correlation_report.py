@@ -6,7 +6,10 @@ import numpy as np
 
 from cms.assessment.correlation.correlate import Correlation
 from cms.assessment.correlation.update import Update
+from cms.assessment.quality.limits import LIMITS, Limit
+from cms.assessment.quality.record import worst
 from cms.assessment.report.formatting import hertz, signed_percent
+from cms.assessment.report.parts import records_table
 from cms.jobs.studies.correlation_file import CorrelationResult
 from fe_models.foundation.documents.charts import Axis, Chart, Matrix
 from fe_models.foundation.documents.document import (
@@ -22,18 +25,19 @@ from fe_models.foundation.documents.document import (
 
 __all__ = ["correlation_document"]
 
-GOOD_MAC, POOR_MAC = 0.9, 0.7  #: customary limits of the MAC: good above the first, poor below the second
-GOOD_ERROR, POOR_ERROR = 0.02, 0.05
-GOOD_CROSS = 0.1  #: customary limit of the mass-weighted product of two measured shapes
+DETERMINED = Limit("share of a parameter that the test does not determine", 0.1, 0.5, "")
 MOST_POINTS = 20
 
 
 def correlation_document(result: CorrelationResult) -> Document:
     """Return the document."""
-    last = result.correlation if result.update is None else result.update.after
-    sections = [pairs_section(result), mac_section(result), orthogonality_section(last), points_section(last)]
+    last = result.last
+    verdicts = Section("verdicts", "Verdicts", (records_table(last.records),))
+    sections = [
+        verdicts, pairs_section(result), mac_section(result), orthogonality_section(last), points_section(last),
+    ]  # fmt: skip
     if result.update is not None:
-        sections.insert(1, update_section(result.update))
+        sections.insert(2, update_section(result.update))
     if result.damping:
         sections.append(damping_section(result))
     footer = "Written by cms correlate. The same numbers stand in the JSON file where one was asked for."
@@ -56,10 +60,9 @@ def facts(c: Correlation) -> str:
 def answer(result: CorrelationResult) -> Answer:
     """Return the main result in a sentence, with its numbers."""
     first = result.correlation
-    last = first if result.update is None else result.update.after
-    if not last.pairs:
-        words, verdict = "No measured mode has a partner in the model.", "fail"
-    else:
+    last = result.last
+    words = "No measured mode has a partner in the model."
+    if last.pairs:
         macs = [pair.mac for pair in last.pairs]
         error = float(np.abs(last.errors).max())
         words = (
@@ -70,21 +73,17 @@ def answer(result: CorrelationResult) -> Answer:
             words += f" Before the update the largest error was {100 * float(np.abs(first.errors).max()):.2g} %."
             if not result.update.is_converged:
                 words += " The update did not converge."
-        is_good = len(last.pairs) == last.measured.n_modes and error <= GOOD_ERROR and min(macs) >= GOOD_MAC
-        verdict = "pass" if is_good else "warn"
-    return Answer(words, verdict)
+    return Answer(words, worst(last.records))
 
 
-def graded(value: float, good: float, poor: float, words: str) -> Cell:
-    """Return a number in the colour of its grade; small values are good if good < poor."""
-    sign = 1.0 if good < poor else -1.0
-    kind = "pass" if sign * value <= sign * good else "warn" if sign * value <= sign * poor else "fail"
-    return Cell(words, f"n {kind}")
+def graded(value: float, limit: Limit, words: str) -> Cell:
+    """Return a number in the colour of the verdict about it."""
+    return Cell(words, f"n {limit.verdict(value)}")
 
 
 def pairs_section(result: CorrelationResult) -> Section:
     """Return the section about pairs of modes."""
-    c = result.correlation if result.update is None else result.update.after
+    c = result.last
     first = result.correlation
     before = {pair.measured: error for pair, error in zip(first.pairs, first.errors, strict=True)}
     by_mode = {pair.measured: (pair, error) for pair, error in zip(c.pairs, c.errors, strict=True)}
@@ -97,8 +96,8 @@ def pairs_section(result: CorrelationResult) -> Section:
             cells += [
                 Cell(str(pair.computed + 1), "n", "by hand" if pair.by_hand else ""),
                 Cell(hertz(c.model.frequencies[pair.computed]), "n"),
-                graded(abs(error), GOOD_ERROR, POOR_ERROR, signed_percent(float(error))),
-                graded(pair.mac, GOOD_MAC, POOR_MAC, f"{pair.mac:.3f}"),
+                graded(abs(error), LIMITS["test-frequency"], signed_percent(float(error))),
+                graded(1 - pair.mac, LIMITS["test-mac"], f"{pair.mac:.3f}"),
             ]
         else:
             likest = int(np.argmax(c.mac[k]))
@@ -109,8 +108,7 @@ def pairs_section(result: CorrelationResult) -> Section:
         rows.append(cells)
     headings = ["measured>", "Hz>", "damping %>", "computed>", "Hz>", "error>", "MAC>"]
     headings += ["error before>"] if result.update is not None else []
-    lead = "Pairs by the greatest sum of MAC; errors are those of the model. Green, amber, red: within "
-    lead += f"{100 * GOOD_ERROR:g} %, {100 * POOR_ERROR:g} %, beyond; MAC above {GOOD_MAC:g}, {POOR_MAC:g}, below."
+    lead = "Pairs by the greatest sum of MAC; errors are those of the model, coloured by the limits of the verdicts."
     return Section("pairs", "Pairs of modes", (TextTable(headings, rows),), lead, "Pairs")
 
 
@@ -143,10 +141,9 @@ def orthogonality_section(c: Correlation) -> Section:
     off = own - np.diag(np.diag(own))
     k, j = np.unravel_index(int(np.argmax(off)), off.shape) if off.size > 1 else (0, 0)
     words = "measured, of the pairs"
-    verdict = "within" if off[k, j] <= GOOD_CROSS else "beyond"
     lead = (
         f"By the mass of the model at the measured rows. Largest coupling of two measured shapes {off[k, j]:.3f}, "
-        f"modes {c.pairs[k].measured + 1} and {c.pairs[j].measured + 1}: {verdict} the custom of {GOOD_CROSS:g}."
+        f"modes {c.pairs[k].measured + 1} and {c.pairs[j].measured + 1}."
     )
     partners = heat(np.abs(c.cross_orthogonality), "computed, of the pairs", words)
     figures = [
@@ -158,7 +155,7 @@ def orthogonality_section(c: Correlation) -> Section:
 
 def points_section(c: Correlation) -> Section:
     """Return the section about the points with the poorest agreement."""
-    rows = [[Cell(str(point), "n"), Cell(node, "n"), graded(value, GOOD_MAC, POOR_MAC, f"{value:.3f}")]
+    rows = [[Cell(str(point), "n"), Cell(node, "n"), graded(1 - value, LIMITS["test-mac"], f"{value:.3f}")]
             for point, node, value in c.point_comac()[:MOST_POINTS]]  # fmt: skip
     if not rows:
         return Section("points", "Points", (Paragraph("No modes are paired.", "notice"),))
@@ -178,7 +175,7 @@ def update_section(update: Update) -> Section:
         cells = [Cell(p.name, "name", f"{p.path}{'; at its bound' if at_end else ''}"), Cell(f"{p.start:.6g}", "n"),
                  Cell(f"{value:.6g}", "n"), Cell(signed_percent(float(value / p.start - 1)), "n"),
                  Cell(f"\u00b1 {100 * spread:.2g} %", "n"), Cell(f"\u00b1 {100 * p.spread:.2g} %", "n"),
-                 graded(float(told), 0.9, 0.5, f"{100 * told:.0f} %")]  # fmt: skip
+                 graded(1 - float(told), DETERMINED, f"{100 * told:.0f} %")]  # fmt: skip
         rows.append(cells)
     headings = ["parameter", "start>", "updated>", "change>", "spread after>", "before>", "told by the test>"]
     n = len(update.parameters)

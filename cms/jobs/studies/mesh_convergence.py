@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from cms.assessment.quality.record import QualityRecord
 from cms.errors import JobError
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import Job, read_job
@@ -64,6 +65,10 @@ class MeshConvergence:
         """Power of the element size with which the largest estimated error falls, by step (5)."""
         coarse, fine = (each.worst for each in self.estimates)
         return float(np.clip(np.log(coarse / fine) / np.log(self.ratio), *RATES))
+
+    def judged(self, error: float) -> QualityRecord:
+        """Return the verdict about the finer mesh for a wanted error, as `MeshEstimate.judged`."""
+        return self.estimates[1].judged(error, self.rate, self.sizes[1])
 
     def size_for(self, error: float) -> float:
         """Return the element size for which the largest estimated error of the frequencies is `error` [length]."""

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cms.assessment.quality.record import QualityRecord, information, judge
 from cms.assessment.rendering import Drawing, Scene, Surface, render_picture
 from cms.assessment.report.view import view_axes
 from cms.errors import JobError
@@ -43,6 +44,30 @@ class MeshEstimate:
     def size_factor(self, error: float, rate: float = RATE) -> float:
         """Return the factor of the element size that makes the largest error equal to `error`."""
         return float((error / self.worst) ** (1 / rate))
+
+    def judged(self, error: float, rate: float = RATE, size: float | None = None) -> QualityRecord:
+        """Return the verdict about the largest error, with the element size for the wanted error as reason.
+
+        Parameters
+        ----------
+        error
+            Largest error of the frequencies that passes.
+        rate
+            Power of the element size with which the error falls.
+        size
+            Element size of this mesh, if the mesh has one.
+        """
+        if np.isnan(self.worst):
+            return information("mesh-error", self.errors.method)
+        factor, k = self.size_factor(error, rate), int(np.nanargmax(self.errors.frequency))
+        return judge(
+            "mesh-error", self.worst,
+            f"mode {k + 1} of {len(self.frequencies)} has the largest error, {100 * self.worst:.2g} %; for "
+            f"{100 * error:.2g} %, elements {factor:.2g} times as large"
+            + ("" if size is None else f", size {size * factor:.3g}")
+            + f", if the error falls with the size to the power {rate:.2g}",
+            {"error": self.errors.frequency}, tolerance=error,
+        )  # fmt: skip
 
     def oversize(self, error: float) -> Array:
         """Return for each surface triangle by which factor its element is too large for this error, (n_tri,).

@@ -32,6 +32,7 @@ from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
 from cms.jobs.studies import correlation_document
 from cms.pipeline import reduce_job
+from fe_models.files import read_table
 from fe_models.foundation.documents.html import html_page
 from tests.bodies import box_mesh
 from tests.cms.assessment.correlation.synthetic_test import mode_table_text, universal_text, write
@@ -355,8 +356,12 @@ def test_file_command_page_and_updated_job(folder, specimen, rows, tmp_path, cap
     page = (tmp_path / "t.html").read_text()
     assert "MAC" in page
     assert 'id="update"' in page
-    assert run(monkeypatch, ["correlate", str(file), "--json"]) == 0
+    written = [tmp_path / name for name in ("out.json", "out.csv")]
+    assert run(monkeypatch, ["correlate", str(file), "--json", "-o", str(written[0]), "-o", str(written[1])]) == 0
     record = json.loads(capsys.readouterr().out)
+    assert [each["verdict"] for each in record["after"]["records"]] == ["pass"] * 4
+    assert json.loads(written[0].read_text())["after"] == record["after"]
+    np.testing.assert_array_equal(read_table(written[0])["MAC"], read_table(written[1])["MAC"])
     assert record["update"]["parameters"][0]["value"] == pytest.approx(STIFFER * YOUNG, rel=2e-3)
     assert len(record["after"]["pairs"]) == N
     for change, message in {
@@ -372,6 +377,13 @@ def test_file_command_page_and_updated_job(folder, specimen, rows, tmp_path, cap
     result = cms.correlate(plain)
     assert result.update is None
     assert "Orthogonality" in html_page(correlation_document(result))
+    off = result.correlation.records[1]
+    assert (off.name, off.verdict) == ("test-frequency", "warn")
+    assert_allclose(off.value, np.abs(result.correlation.errors).max(), rtol=1e-12)
+    alone = replace(result.correlation, pairs=result.correlation.pairs[1:]).records[0]
+    assert (alone.name, alone.verdict, alone.reason) == (
+        "test-partners", "warn", f"{N - 1} of {N} measured modes have a partner, not 1",
+    )  # fmt: skip
 
 
 def run(monkeypatch, arguments):

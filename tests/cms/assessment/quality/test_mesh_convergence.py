@@ -78,6 +78,10 @@ def test_the_command_says_sizes_and_errors(job_file):
     assert record["sizes"] == [13.5, 9.0]
     assert len(record["estimated_error"]) == len(record["mesh_error"]) == 3
     assert record["size_factor"] == pytest.approx((0.01 / max(record["mesh_error"])) ** (1 / record["rate"]))
+    (verdict,) = record["records"]
+    assert verdict["value"] == max(record["mesh_error"])
+    assert (verdict["tolerance"], verdict["verdict"]) == (0.01, "pass" if verdict["value"] <= 0.01 else "warn")
+    assert f"size {9 * record['size_factor']:.3g}, if the error falls" in verdict["reason"]
     words = run_cms("converge", path, "--modes", "3").stdout
     assert "size 13.5 mm [Hz]" in words
     assert "the error is that of size 9 mm, estimated with order 1" in words
