@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Iterator
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +17,13 @@ import floatframe.cli.app
 from cms.body.modal_file.schema import ENTRIES, GROUPS, dataset_of
 from fe_models.files.field_pages import field_tables
 from fe_models.foundation.file_kinds import KINDS
-from fe_models.foundation.parametric_file import schema_text
+from fe_models.foundation.parametric_file import REPEAT, schema_text
 from fe_models.foundation.units import Units
 from floatframe.engine.kernels.memory import Rows
 from floatframe.results.results_file import DATASETS
 
+NOTHING = (None, "", [], {})  #: defaults that a page leaves blank
+OTHER = "Tables within others"  #: heading of the tables that several others hold
 PROGRAMS = {"cms": cms.cli.app.app, "floatframe": floatframe.cli.app.app}
 
 
@@ -84,30 +87,55 @@ def parameters_table(parameters: list[Any]) -> list[str]:
 
 
 def keys_page(kind: str) -> str:
-    """Return the page of the keys of a kind of file, a section for each of its tables."""
+    """Return the page of the keys of a kind of file: the file, then its tables, those of one place together."""
     schema = json.loads(schema_text(kind))
     lines = [
         f"# Keys of {'an' if kind == 'optimization' else 'a'} {kind} file", "",
         f"`kind = \"{kind}\"`; `{KINDS[kind].command} FILE` runs it, and `floatframe schema {kind}` prints its schema. "
         "A key without a default is required where its table is given, unless its meaning says otherwise.", "",
-        "## The file", "", *keys_table(schema), "",
     ]  # fmt: skip
-    for definition in schema.get("$defs", {}).values():
-        if definition.get("properties"):
-            meaning = definition.get("description", "")
-            where, _, rest = meaning.partition(": ") if meaning.startswith("[") else (definition["title"], "", meaning)
-            lines += [f"## {literal(where)}", "", literal(rest), "", *keys_table(definition), ""]
+    if KINDS[kind].is_parametric:
+        lines += ["Every table but the file itself may have `repeat`: " + literal(REPEAT) + ".", ""]
+    lines += ["## The file", "", *keys_table(schema), ""]
+    for place, sections in groupby(sections_of(schema), key=lambda section: section[0]):
+        lines += [f"## {literal(place)}", ""]
+        for _, name, meaning, rows in sections:
+            lines += [f"### {name}", ""] if name else []
+            lines += [literal(meaning[:1].upper() + meaning[1:]), "", *rows, ""]
     return "\n".join(lines)
 
 
+def sections_of(schema: dict[str, Any]) -> list[tuple[str, str, str, list[str]]]:
+    """Return place, type, meaning and rows of each table of a file, in the order of the keys of the file."""
+    order = [*schema["properties"], OTHER]
+    found = []
+    for definition in schema.get("$defs", {}).values():
+        if rows := definition.get("properties") and keys_table(definition):
+            meaning = definition.get("description", "")
+            where, _, rest = meaning.partition(": ") if meaning.startswith("[") else (OTHER, "", meaning)
+            place, _, name = where.rstrip(".").partition(" of type ")
+            name = name.strip('"') if meaning.startswith("[") else re.sub("(Section|Table)$", "", definition["title"])
+            found.append((place, name, rest, rows))
+
+    def rank(section: tuple[str, str, str, list[str]]) -> tuple[int, str, str]:
+        """Return the rank of a table: by the key of the file that holds it, its path, its type."""
+        path = section[0].strip("[").split("]")[0]
+        return order.index(OTHER if section[0] == OTHER else path.split(".")[0]), path, section[1]
+
+    return sorted(found, key=rank)
+
+
 def keys_table(definition: dict[str, Any]) -> list[str]:
-    """Return the keys of a table of a file, with their meanings and defaults."""
+    """Return the keys of a table of a file, with their meanings and defaults; `repeat` is a key of every table."""
     rows = []
     for key, value in definition["properties"].items():
         found = [value, *value.get("anyOf", ())]
-        defaults = [json.dumps(each["default"], ensure_ascii=False) for each in found if each.get("default")]
+        given = [each["default"] for each in found if each.get("default") not in NOTHING]
+        defaults = [json.dumps(default, ensure_ascii=False) for default in given]
         meaning = next((each["description"] for each in found if "description" in each), "")
-        rows.append((f"`{key}`", literal(meaning), f"`{defaults[0]}`" if defaults and len(defaults[0]) < 60 else ""))
+        if meaning != REPEAT:
+            default = f"`{defaults[0]}`" if defaults and len(defaults[0]) < 60 else ""
+            rows.append((f"`{key}`", literal(meaning), default))
     return table(("key", "meaning", "default"), rows)
 
 

@@ -113,6 +113,9 @@ def read_parametric(path: Path, error: type[Exception], changes: Mapping[str, An
     return result
 
 
+REPEAT = "a count, a table of names with counts or lists, or rows"  #: meaning of the key `repeat` of every table
+
+
 def json_schema(model: type[Table], *, is_parametric: bool) -> dict[str, Any]:
     """Return the JSON schema of the files of a model, with which editors complete and describe keys.
 
@@ -126,7 +129,7 @@ def json_schema(model: type[Table], *, is_parametric: bool) -> dict[str, Any]:
     schema = with_expressions(schema)
     for table in tables.values():
         if "properties" in table:
-            table["properties"]["repeat"] = {"description": "a count, a table of names with counts or lists, or rows"}
+            table["properties"]["repeat"] = {"description": REPEAT}
     if tables:
         schema["$defs"] = tables
     schema["properties"]["parameters"] = {"type": "object", "description": "values and expressions by name"}

@@ -113,11 +113,24 @@ def test_every_key_of_every_kind_of_file_has_a_meaning_on_its_page():
     for kind in KINDS:
         page, schema = reference_pages.keys_page(kind), json.loads(schema_text(kind))
         for name, table in {"the file": schema, **schema.get("$defs", {})}.items():
-            if keys := table.get("properties", {}):
+            if keys := set(table.get("properties", {})) - {"repeat"}:
                 rows = "\n".join(reference_pages.keys_table(table))
                 assert rows in page
                 missing += [f"{kind}, {name}: {key}" for key in keys if not has_meaning(key, rows)]
     assert missing == []
+
+
+def test_the_tables_of_a_system_file_stand_by_their_place_in_the_order_of_the_file():
+    page = reference_pages.keys_page("system")
+    assert "`repeat`" in page.split("## The file")[0]
+    keys = [*json.loads(schema_text("system"))["properties"]]
+    places = [heading.strip("\\[").split(".")[0] for heading in re.findall(r"^## \\\[(.*?)\\\]", page, re.MULTILINE)]
+    assert [keys.index(place) for place in places] == sorted(keys.index(place) for place in places)
+    joints = page.split("\n## \\[joints.NAME\\]\n")[1].split("\n## ")[0]
+    revolute = joints.split("\n### revolute\n")[1].split("\n### ")[0]
+    assert "five constraints. Coordinates: angle.\n" in revolute
+    bushing = page.split("\n### bushing\n")[1].split("\n### ")[0]
+    assert re.search(r'^\| `axes` \| .* \| `"a"` \|$', bushing, re.MULTILINE)  # defaults of classes are listed
 
 
 def has_meaning(key, rows):

@@ -29,6 +29,7 @@ from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
 
 from cms.body.address import Address
 from fe_models.foundation.toml_file import Matrix3, Table, choice, existing_file, is_no_number
+from fe_models.foundation.units import SI, Quantity, unit_text
 from floatframe.errors import ModelError, SignalError
 from floatframe.files.system_file.class_fields import ClassField, class_fields, summary_of
 from floatframe.files.system_file.coordinate_section import CoordinateSection, NamedCoordinate
@@ -46,6 +47,7 @@ from floatframe.model.bodies.coordinates import Coordinate, JointCoordinateName
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.functions.registry import TIME_FUNCTIONS
 from floatframe.model.functions.time_functions import TimeFunction
+from floatframe.model.joints.joint import Joint
 
 __all__ = [
     "DescribedSection",
@@ -225,7 +227,14 @@ def fields_of_value(each: ClassField, stated: tuple[type, ...] = ()) -> dict[str
     text = ": ".join(filter(None, (key.meaning, each.meaning)))
     if each.is_required or isinstance(each.default, stated):
         return {each.name: (key.type, pydantic.Field(description=text))}
-    return {each.name: (key.type | None, pydantic.Field(None, description=text))}
+    extra: dict[str, Any] | None = None
+    if isinstance(each.default, Quantity):
+        text += f"; default: {float(each.default):g} {unit_text(SI, each.default.dimensions)}"
+    elif isinstance(each.default, bool | int | float | str):
+        extra = {"default": each.default}
+    elif isinstance(each.default, tuple) and all(isinstance(part, int | float) for part in each.default):
+        extra = {"default": [*each.default]}
+    return {each.name: (key.type | None, pydantic.Field(None, description=text, json_schema_extra=extra))}
 
 
 @cache
@@ -267,6 +276,8 @@ def model_of_keys(kind: Any, place: str, name: str, base: type[Model], keys: Map
     typed: dict[str, Any] = {"type": (Literal[name], pydantic.Field(description=f'"{name}"'))} if name else {}
     where = f'{place} of type "{name}"' if name else place
     text = ": ".join(filter(None, (where, summary_of(kind))))
+    if isinstance(kind, type) and issubclass(kind, Joint) and kind.coordinates:
+        text += f" Coordinates: {', '.join(kind.coordinates)}."
     title = {"title": name} if name else {}
     model = create_model(kind.__name__, __base__=base, __doc__=text, __cls_kwargs__=title, **typed, **keys)
     model.described = kind if isinstance(kind, type) else staticmethod(kind)
