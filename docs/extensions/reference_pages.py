@@ -225,16 +225,19 @@ def table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[str]:
 
 
 def literal(text: str) -> str:
-    """Return plain text so that MyST shows it as it is written; names of pages become links."""
-    parts = re.split(r"((?:docs/)\w+\.md)", re.sub(r"\s+", " ", text))
-    return "".join(linked(parts))
+    """Return plain text so that MyST shows it as it is written; words in backticks are code, names of pages links."""
+    parts = re.split(r"(docs/\w+\.md|`[^`]+`)", re.sub(r"\s+", " ", text))
+    return "".join(shown(parts))
 
 
-def linked(parts: list[str]) -> Iterator[str]:
-    """Yield text with escaped marks, and links for the names of pages at the odd places."""
+def shown(parts: list[str]) -> Iterator[str]:
+    """Yield text with escaped marks; at the odd places code, and links for the names of pages."""
     for k, part in enumerate(parts):
-        page = part.removeprefix("docs/")
-        yield f"[{page.removesuffix('.md')}](../{page})" if k % 2 else re.sub(r"([\\`*_{}<>\[\]#$])", r"\\\1", part)
+        if k % 2:
+            page = part.removeprefix("docs/")
+            yield part if part.startswith("`") else f"[{page.removesuffix('.md')}](../{page})"
+        else:
+            yield re.sub(r"([\\`*_{}<>\[\]#$])", r"\\\1", part)
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
