@@ -8,13 +8,16 @@ from typing import Annotated
 import numpy as np
 
 from cms.errors import BodyError
-from fe_models.foundation.arrays import Array, frozen, require_finite
+from fe_models.foundation.arrays import Array, frozen, require_finite, tilde
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import ArrayShape, checked_fields, frozen_copies
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["INERTIA_TERMS", "NEGATIVITY", "Moments", "NodalSums", "known_P", "known_S_kl", "moments_from_gram"]
+__all__ = [
+    "INERTIA_TERMS", "NEGATIVITY", "Moments", "NodalSums", "known_P", "known_S_kl", "moments_from_gram",
+    "rigid_mass_of",
+]  # fmt: skip
 
 
 #: Terms that a reduced mass matrix alone does not determine: the symmetric part of P; the part of S_kl that is
@@ -120,6 +123,16 @@ class Moments:
         P = self.P
         return frozen(np.stack([P[1, 2] - P[2, 1], P[2, 0] - P[0, 2], P[0, 1] - P[1, 0]]))
 
+    @property
+    def rigid_mass(self) -> Array:
+        """Mass matrix of the undeformed body for translation and rotation about the frame origin, (6, 6)."""
+        return rigid_mass_of(self.m, self.S, self.J0)
+
+    @property
+    def coupling(self) -> Array:
+        """Momentum and angular momentum of the shapes, [1C; 2C], (6, n_q)."""
+        return np.vstack([self.C1, self.C2])
+
     @cached_property
     def C3(self) -> Array:
         """3C_k = ∫ (c·phi_k 1 - phi_k cᵀ) = tr(P_k) 1 - P_kᵀ, (n_q, 3, 3) [kg m]."""
@@ -206,6 +219,11 @@ class Moments:
         """Return J(q) = J0 + Σ q_k (3C_k + 3C_kᵀ) + Σ q_k q_l 5C_kl, (3, 3) [kg m²], symmetric."""
         linear = np.einsum("k,kab->ab", q, self.C3)
         return self.J0 + linear + linear.T + np.einsum("k,l,klab->ab", q, q, self.C5)
+
+
+def rigid_mass_of(m: float, S: Array, J: Array) -> Array:
+    """Return [m 1, -S~; S~, J] of mass, first moment and inertia about one point, (6, 6)."""
+    return np.block([[m * np.eye(3), tilde(S).T], [tilde(S), J]])
 
 
 def known_P(P: Array, missing: Iterable[str]) -> Array:

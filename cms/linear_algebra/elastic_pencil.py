@@ -5,7 +5,7 @@ import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
 
-__all__ = ["elastic_eigenvectors", "turn_to_diagonal"]
+__all__ = ["elastic_eigenvectors", "stiffness_scale", "turn_to_diagonal"]
 
 INDEPENDENT = 1e-14  #: smallest eigenvalue of the norm W, scaled to a unit diagonal, of an independent direction
 MASSLESS = 1e-12  #: modal mass times omega_1² below which a shape of unit W-length is static
@@ -55,6 +55,13 @@ def elastic_eigenvectors(G_K: Array, G_M: Array, omega2_1: float) -> tuple[Array
         massive = massive @ turn_to_diagonal(massive.T @ G_K @ massive)  # (4)
         Z[:, is_massive] = massive
     return Z, is_massive
+
+
+def stiffness_scale(K: Array, M: Array) -> float:
+    """Return the smallest positive K_kk / M_kk [1/s²]; 1 if there is none."""
+    stiffness, mass = np.diag(K), np.diag(M)
+    has_both = (mass > 0) & (stiffness > 0)
+    return float((stiffness[has_both] / mass[has_both]).min()) if has_both.any() else 1.0
 
 
 def turn_to_diagonal(G_K: Array) -> Array:

@@ -82,7 +82,7 @@ def converted(reduced: ReducedBody, frame: Frame, *, damping: Damping | None = N
         )
     C, target = condition_of(reduced, frame)  # step (1)
     require_convertible(reduced, target)
-    Y, M_R = rigid_mass(reduced.moments)
+    Y, M_R = reduced.moments.coupling, reduced.moments.rigid_mass
     M = reduced.M - C.T @ Y - Y.T @ C + C.T @ M_R @ C  # (2)
     Z, is_massive = modes_of(reduced, (M + M.T) / 2)  # (3)
     change = Change(C, Z, *relative_place(reduced.frame, target))
@@ -206,15 +206,6 @@ def six_motions(position: Array) -> Array:
 
 
 # (2), (3) Pencil of the new frame ------------------------------------------------------------------------------------
-
-
-def rigid_mass(moments: Moments) -> tuple[Array, Array]:
-    """Return Psi_Rᵀ M Phi, (6, n_q), and the rigid-body mass matrix Psi_Rᵀ M Psi_R, (6, 6), about the origin."""
-    M_R = np.zeros((6, 6))
-    M_R[:3, :3], M_R[3:, 3:] = moments.m * np.eye(3), moments.J0
-    M_R[3:, :3] = np.cross(moments.S, np.eye(3)).T  # column a is the torque S × e_a
-    M_R[:3, 3:] = M_R[3:, :3].T
-    return np.vstack([moments.C1, moments.C2]), M_R
 
 
 def modes_of(reduced: ReducedBody, M: Array) -> tuple[Array, np.ndarray]:

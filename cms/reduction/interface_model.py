@@ -23,7 +23,8 @@ import scipy.linalg as la
 
 from cms.body.reduced_body import ReducedBody, ReducedInterface
 from cms.errors import ExportError
-from cms.reduction.frame_conversion import rigid_mass, six_motions
+from cms.reduction.frame_conversion import six_motions
+from cms.reduction.free_pencil import free_pencil
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.foundation.arrays import MOTION_COMPONENTS, Array, IntArray, symmetric_part
 
@@ -100,7 +101,8 @@ def interface_model(body: ReducedBody) -> InterfaceModel:
         if it can move with all interfaces fixed.
     """
     nodes, B = boundary_of(body)
-    M, K, D, loads = free_matrices(body)
+    pencil, loads = free_pencil(body), loads_of(body)
+    M, K, D = pencil.M, pencil.K, pencil.D
     S = 1 / np.maximum(np.abs(B).max(axis=0), np.finfo(float).tiny) if len(B) else np.ones(B.shape[1])
     S[np.abs(B).max(axis=0, initial=0.0) == 0] = 1.0
     rows = 1 / np.maximum(np.linalg.norm(B * S, axis=1), np.finfo(float).tiny)
@@ -122,18 +124,12 @@ def interface_model(body: ReducedBody) -> InterfaceModel:
     return InterfaceModel(body, nodes, K_y, M_y, D_y, T, T.T @ loads)
 
 
-def free_matrices(body: ReducedBody) -> tuple[Array, Array, Array, Array]:
-    """Return M, K, D and loads over z, or over q alone for a body that is fixed to the ground."""
-    M, K, D = (np.array(matrix) for matrix in (body.M, body.K, body.D))
+def loads_of(body: ReducedBody) -> Array:
+    """Return the load cases over z, or over q alone for a body that is fixed to the ground, a column each."""
     loads = np.array([case.h for case in body.load_cases]).reshape(-1, body.n_q).T
     if body.is_held:
-        return M, K, D, loads
-    Y, M_R = rigid_mass(body.moments)
-    wrench = np.array([[*case.force, *case.torque] for case in body.load_cases]).reshape(-1, 6).T
-    nothing, pad = np.zeros((6, 6)), np.zeros((6, body.n_q))
-    whole = np.block([[M_R, Y], [Y.T, M]])
-    K, D = (np.block([[nothing, pad], [pad.T, each]]) for each in (K, D))
-    return whole, K, D, np.vstack([wrench, loads])
+        return loads
+    return np.vstack([np.array([[*case.force, *case.torque] for case in body.load_cases]).reshape(-1, 6).T, loads])
 
 
 def boundary_of(body: ReducedBody) -> tuple[tuple[BoundaryNode, ...], Array]:

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from cms.assessment.correlation.errors import CorrelationError
-from cms.assessment.quality.reference.free_pencil import free_elastic_modes
 from cms.body.reduced_body import ReducedBody
 from cms.linear_algebra.solvers.eigen import eigenmodes
 from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.modes.families.families import Families
+from cms.reduction.free_pencil import free_elastic_modes
 from fe_models.body.fe_body import FEBody
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.foundation.arrays import Array, IntArray

@@ -7,19 +7,19 @@ from typing import Annotated
 
 import numpy as np
 
-from cms.assessment.quality.reference.free_pencil import free_elastic_modes, has_inertia
 from cms.body.geometric_stiffness import GeometricStiffness
 from cms.body.invariants import Moments, moments_from_gram
 from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface, unit_findings
 from cms.errors import ForeignBodyError
 from cms.exchange.importers.superelement import listed
 from cms.exchange.importers.superelement_body import ImportOptions
-from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
+from cms.linear_algebra.elastic_pencil import elastic_eigenvectors, stiffness_scale
 from cms.linear_algebra.solvers.eigen import orientation
 from cms.reduction.basis.damping import modal_damping
 from cms.reduction.basis.frames import TisserandFrame
 from cms.reduction.basis.node_results import are_spread, mean_translation
 from cms.reduction.frame_conversion import convert_frame
+from cms.reduction.free_pencil import free_elastic_modes, has_inertia
 from fe_models.body.couplings.couplings import mean_motion
 from fe_models.body.load_cases import ReducedLoadCase
 from fe_models.foundation.arrays import Array, IntArray, frozen
@@ -147,10 +147,8 @@ def body_of_modes(body: ModalBody, options: ImportOptions) -> ReducedBody:
     stiffness, mass = np.diag(body.K), np.diag(body.M)
     if (mass <= 0).all() or not (stiffness > 0).any():
         raise ForeignBodyError(f"{where}: expected modes with mass and stiffness, got none")
-    usable = (mass > 0) & (stiffness > 0)
-    scale = float((stiffness[usable] / mass[usable]).min()) if usable.any() else 1.0
     try:
-        Z, is_massive = elastic_eigenvectors(body.K, body.M, scale)  # (2)
+        Z, is_massive = elastic_eigenvectors(body.K, body.M, stiffness_scale(body.K, body.M))  # (2)
     except np.linalg.LinAlgError as error:
         raise ForeignBodyError(f"{where}: {error}; its modes are not independent") from error
     omega2 = np.einsum("lk,lm,mk->k", Z, body.K, Z)

@@ -17,7 +17,6 @@ from cms.assessment.quality.of_reduction.frequencies import compare_shapes, freq
 from cms.assessment.quality.of_reduction.mass_properties import check_mass_properties
 from cms.assessment.quality.record import QualityRecord, has_failed, information, judge
 from cms.assessment.quality.reduction_check import check_reduction, require_same_units
-from cms.assessment.quality.reference.free_pencil import free_elastic_modes
 from cms.assessment.quality.reference.full_reference import FullReference, usable_band
 from cms.body.modal_file.file import digest as digest_of
 from cms.body.modal_file.file import read
@@ -32,6 +31,7 @@ from cms.jobs.mode_set_of_job import job_mode_set, reduction_of, reduction_optio
 from cms.jobs.studies.mesh_convergence import mesh_convergence
 from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.modes.families.families import Families
+from cms.reduction.free_pencil import free_elastic_modes
 from fe_models.assembly.assemble import assemble
 from fe_models.assembly.tables.materials import solid_properties
 from fe_models.body.fe_body import FEBody

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg as la
 
 from cms.body.reduced_body import BodyFrame
 from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
@@ -17,8 +16,6 @@ from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.tall.columns import combine, dots, gram, inner, of_this_process
 
 __all__ = ["FreeBasis", "ShapeRounding", "basis_of_finished", "free_basis", "ritz_basis", "shape_rounding"]
-
-MASSLESS = 1e-12  #: modal mass times omega_1² of a shape of unit W-norm, below which the shape is static
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +127,7 @@ def ritz_basis(body: FEBody, X: Array, N: Array) -> FreeBasis:
 
     (1) find W-orthonormal columns Q, W = K + omega_1² M, and drop redundant columns; then subtract rigid-body motion,
         which rounding leaves in nearly redundant columns
-    (2) solve Qᵀ M Q y = mu Qᵀ W Q y; omega² = (1 - omega_1² mu) / mu; static shapes (mu = 0) are last
+    (2) solve Qᵀ K Q z = omega² Qᵀ M Q z; static shapes are last
 
     Parameters
     ----------
@@ -147,11 +144,6 @@ def ritz_basis(body: FEBody, X: Array, N: Array) -> FreeBasis:
     basis, _ = independent_basis(X, G_K, G_M, products, body, omega2_1)  # (1)
     Q = basis.columns(products)
     E = Q.X - combine(N, inner(N, Q.MX))
-    G_M = gram_in_blocks(E, products.M)
-    mu, Y = la.eigh(G_M, gram(E, Q.KX) + omega2_1 * G_M)  # (2)
-    mu, Y = mu[::-1], Y[:, ::-1]
-    is_massive = mu * omega2_1 > MASSLESS
-    size = np.where(is_massive, 1 / np.sqrt(np.where(is_massive, mu, 1.0)), 1.0)
-    Phi = combine(E, Y * size)
-    omega2 = np.where(is_massive, 1 / np.where(is_massive, mu, 1.0) - omega2_1, 1.0)
-    return FreeBasis(Phi, omega2, is_massive, N)
+    G_K, G_M = gram(E, Q.KX), gram_in_blocks(E, products.M)
+    Z, is_massive = elastic_eigenvectors(G_K, G_M, omega2_1)  # (2)
+    return FreeBasis(combine(E, Z), dots(Z, G_K @ Z), is_massive, N)

@@ -15,9 +15,9 @@ from cms.body.recovery_table import N_RIGID
 from cms.body.reduced_body import BodyFrame, ReducedBody
 from cms.errors import RecoveryError
 from cms.reduction.basis.node_results import reference_motion
-from cms.reduction.frame_conversion import rigid_mass, six_motions
+from cms.reduction.frame_conversion import six_motions
+from cms.reduction.free_pencil import whole_pencil
 from cms.reduction.geometric_stiffness.unit_states import has_geometric_stiffness, unit_mass_loads
-from cms.reduction.interface_model import free_matrices
 from cms.reduction.recovery.model_rows import node_rows
 from cms.reduction.recovery.places import Places
 from cms.reduction.recovery.request import RecoveryRequest
@@ -191,18 +191,13 @@ def nodes_of_loads(body: FEBody, requests: Iterable[RecoveryRequest]) -> IntArra
 
 def on_coordinates(body: ReducedBody) -> tuple[Array, Array, Array]:
     """Return M, D and K over z = (d, theta, q), (6 + n_q, 6 + n_q) each; a fixed body has zeros for rigid motions."""
-    M, K, D, _ = free_matrices(body)
-    if not body.is_held:
-        return M, D, K
-    whole = []
-    for matrix in (M, D, K):
-        padded = np.zeros((N_RIGID + body.n_q,) * 2)
-        padded[N_RIGID:, N_RIGID:] = matrix
-        whole.append(padded)
-    return whole[0], whole[1], whole[2]
+    pencil = whole_pencil(body)
+    M = np.array(pencil.M)
+    if body.is_held:
+        M[:N_RIGID] = M[:, :N_RIGID] = 0.0
+    return M, pencil.D, pencil.K
 
 
 def rigid_rows(body: ReducedBody) -> Array:
     """Return the matrix that maps accelerations of z to force and torque about the origin of B, (6, 6 + n_q)."""
-    Y, M_R = rigid_mass(body.moments)
-    return np.hstack([M_R, Y])
+    return np.hstack([body.moments.rigid_mass, body.moments.coupling])

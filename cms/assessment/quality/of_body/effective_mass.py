@@ -8,9 +8,9 @@ import scipy.linalg as la
 
 from cms.assessment.quality.errors import QualityError
 from cms.assessment.quality.record import QualityRecord, information, judge
-from cms.assessment.quality.reference.free_pencil import stiffness_scale, whole_pencil, whole_port_rows
 from cms.body.reduced_body import ReducedBody
-from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
+from cms.linear_algebra.elastic_pencil import elastic_eigenvectors, stiffness_scale
+from cms.reduction.free_pencil import whole_pencil, whole_port_rows
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.foundation.arrays import Array, frozen
 
@@ -97,7 +97,7 @@ def effective_mass(reduced: ReducedBody, at: str) -> EffectiveMass:
     back = 0 * rows[:, 6:] if reduced.is_held else -np.linalg.solve(rows[:, :6], rows[:, 6:])
     T = np.vstack([back, np.eye(reduced.n_q)])  # (1)
     M = T.T @ pencil.M @ T
-    Z, is_massive = elastic_eigenvectors(reduced.K, (M + M.T) / 2, stiffness_scale(reduced))  # (2)
+    Z, is_massive = elastic_eigenvectors(reduced.K, (M + M.T) / 2, stiffness_scale(reduced.K, reduced.M))  # (2)
     Z = Z[:, is_massive]
     omega2 = np.einsum("kq,kl,lq->q", Z, reduced.K, Z)
     order = np.argsort(omega2)

@@ -7,13 +7,13 @@ import numpy as np
 import scipy.linalg as la
 
 from cms.assessment.quality.record import QualityRecord, information, judge
-from cms.assessment.quality.reference.free_pencil import (
+from cms.body.reduced_body import ReducedBody
+from cms.reduction.free_pencil import (
     free_elastic_modes,
     frequency_distance,
     has_inertia,
     whole_pencil,
 )
-from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 
 __all__ = [

@@ -4,8 +4,9 @@ import numpy as np
 
 from cms.assessment.quality.of_body.identities import body_length, mode_size
 from cms.assessment.quality.record import QualityRecord, information, judge
-from cms.assessment.quality.reference.free_pencil import port_rows, stiffness_scale
 from cms.body.reduced_body import ReducedBody, ReducedInterface
+from cms.linear_algebra.elastic_pencil import stiffness_scale
+from cms.reduction.free_pencil import port_rows
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.foundation.arrays import MOTION_COMPONENTS, Array
 
@@ -97,7 +98,7 @@ def missing_motions(reduced: ReducedBody) -> Array:
     """
     length = body_length(reduced)
     stiffness = np.diag(reduced.K)
-    weight = np.sqrt(stiffness_scale(reduced) / np.where(stiffness > 0, stiffness, np.inf))
+    weight = np.sqrt(stiffness_scale(reduced.K, reduced.M) / np.where(stiffness > 0, stiffness, np.inf))
     scale = np.tile(np.repeat([1.0, length], 3), len(reduced.interfaces))
     A = scale[:, None] * np.vstack([port_rows(reduced, interface.name) for interface in reduced.interfaces])
     n_r = A.shape[1] - reduced.n_q

@@ -13,7 +13,6 @@ from cms.assessment.quality.of_body.identities import body_length, mode_size
 from cms.assessment.quality.record import QualityRecord, information, judge
 from cms.body.geometric_stiffness import UNIT_LOADS, GeometricStiffness
 from cms.body.reduced_body import BodyFrame, ReducedBody
-from cms.reduction.frame_conversion import rigid_mass
 from cms.reduction.geometric_stiffness.unit_states import unit_mass_loads
 from fe_models.foundation.arrays import Array
 from fe_models.meshes.mesh import SOLID_TYPES
@@ -132,7 +131,7 @@ def turned_loads(reduced: ReducedBody, geometric: GeometricStiffness) -> Array |
             wrench[own] += np.eye(6)
             wrench[own, 3:][:3] += np.cross(reduced.interfaces[k].position, e)
         try:
-            reaction = -np.linalg.solve(rigid_mass(moments)[1], wrench.T).T
+            reaction = -np.linalg.solve(moments.rigid_mass, wrench.T).T
         except np.linalg.LinAlgError:
             return None
         A = A + np.einsum("jx,xab->jab", reaction[:, 3:], tilde)

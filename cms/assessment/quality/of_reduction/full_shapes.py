@@ -13,7 +13,6 @@ from typing import cast
 import numpy as np
 
 from cms.assessment.quality.record import QualityRecord, judge
-from cms.assessment.quality.reference.free_pencil import frequency_distance
 from cms.assessment.quality.reference.ports import Ports
 from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.errors import BodyError, ModeSetError
@@ -22,6 +21,7 @@ from cms.reduction.basis.finishing import FinishedBasis, finish
 from cms.reduction.basis.frames import FRAMES, Axes, Frame, HeldFrame, NodalFrame, frame_condition
 from cms.reduction.basis.free_basis import FreeBasis, ShapeRounding
 from cms.reduction.basis.node_results import kept_points
+from cms.reduction.free_pencil import frequency_distance
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, frozen
 

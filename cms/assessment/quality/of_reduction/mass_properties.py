@@ -4,6 +4,7 @@ import numpy as np
 
 from cms.assessment.quality.limits import LIMITS
 from cms.assessment.quality.record import QualityRecord, information, judge
+from cms.body.invariants import rigid_mass_of
 from cms.body.reduced_body import ReducedBody
 from fe_models.body.fe_body import FEBody
 from fe_models.body.rigid_motion import rigid_motion_of_dofs
@@ -25,13 +26,7 @@ def rigid_mass_matrix(reduced: ReducedBody) -> Array:
     S = moments.m * o + S_B
     R = A @ moments.R @ A.T + np.outer(o, S_B) + np.outer(S_B, o) + moments.m * np.outer(o, o)
     J = np.trace(R) * np.eye(3) - R
-    return mass_matrix(moments.m, S, J)
-
-
-def mass_matrix(m: float, S: Array, J: Array) -> Array:
-    """Return [m 1, -S~; S~, J], (6, 6)."""
-    S_tilde = np.array([[0.0, -S[2], S[1]], [S[2], 0.0, -S[0]], [-S[1], S[0], 0.0]])
-    return np.block([[m * np.eye(3), -S_tilde], [S_tilde, J]])
+    return rigid_mass_of(moments.m, S, J)
 
 
 def check_mass_properties(body: FEBody, reduced: ReducedBody) -> QualityRecord:

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cms.assessment.quality.errors import QualityError
-from cms.assessment.quality.reference.free_pencil import free_elastic_modes, free_pencil, port_rows
 from cms.body.reduced_body import ReducedBody
+from cms.reduction.free_pencil import free_elastic_modes, free_pencil, port_rows
 from fe_models.foundation.arrays import MOTION_COMPONENTS, Array, frozen
 from fe_models.foundation.documents.table import Table, Tabular
 from fe_models.foundation.presentation import presented

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 
-from cms.assessment.quality.reference.free_pencil import whole_pencil
 from cms.body.reduced_body import ReducedBody, ReducedInterface
-from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
+from cms.linear_algebra.elastic_pencil import elastic_eigenvectors, stiffness_scale
+from cms.reduction.free_pencil import whole_pencil
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.foundation.arrays import STRESS_COMPONENTS, Array, symmetric_part
 from fe_models.foundation.units import Units
@@ -90,7 +90,7 @@ def held_by_bases(where: str, M: Array, K: Array, G: Array, R: Array, scale: Arr
     if not N.shape[1]:
         return Held(T, N, np.zeros(0), N)
     try:
-        Z, is_massive = elastic_eigenvectors(K_N, M_N, scale_of(K_N, M_N))  # (3)
+        Z, is_massive = elastic_eigenvectors(K_N, M_N, stiffness_scale(K_N, M_N))  # (3)
     except np.linalg.LinAlgError as error:
         raise ModelError(f"{where}: no modes with its bases held: {error}") from error
     omega2 = np.einsum("kq,kl,lq->q", Z, K_N, Z)
@@ -124,13 +124,6 @@ def require_followed(where: str, followed: Array, wanted: Array) -> None:
             "it lacks static modes of the held interfaces. Reduce the body with a mode set that has one for each of "
             "their dofs (craig-bampton, guyan, rubin), or hold all interfaces with one base"
         )
-
-
-def scale_of(K: Array, M: Array) -> float:
-    """Return the smallest positive K_kk / M_kk; 1 if there is none."""
-    k, m = np.diag(K), np.diag(M)
-    both = (k > 0) & (m > 0)
-    return float((k[both] / m[both]).min()) if both.any() else 1.0
 
 
 # A reduced body on bases, with driven interfaces, its rigid motion and its modes --------------------------------------

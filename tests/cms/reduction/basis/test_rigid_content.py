@@ -9,7 +9,6 @@ import scipy.sparse as sp
 from numpy.testing import assert_allclose
 
 from cms.assessment.quality.body_check import check_body
-from cms.assessment.quality.reference.free_pencil import free_elastic_modes
 from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
 from cms.linear_algebra.independent import independent_columns
 from cms.modes.families.families import Families
@@ -18,6 +17,7 @@ from cms.modes.mode_sets import craig_bampton_ir
 from cms.reduction.basis.finishing import elastic_directions, orthonormal_motions
 from cms.reduction.basis.frames import NodalFrame, TisserandFrame
 from cms.reduction.basis.free_basis import free_basis
+from cms.reduction.free_pencil import free_elastic_modes
 from cms.reduction.reduction import reduce
 from fe_models.body.couplings.couplings import couple
 from fe_models.body.rigid_motion import rigid_motion_of_dofs

@@ -10,7 +10,6 @@ import cms
 from cms.errors import RecoveryError
 from cms.modes.families.families import Families
 from cms.reduction.basis.frames import frame_condition
-from cms.reduction.frame_conversion import rigid_mass
 from cms.reduction.recovery.load_columns import loads_of_body, loads_of_model, on_coordinates
 from cms.reduction.recovery.matrices import recovery_of_model, residual_response
 from fe_models.body.fe_body import FEBody
@@ -50,7 +49,7 @@ def modal_forces(body: cms.ReducedBody, p):
 
 def statics(body: cms.ReducedBody, p):
     """Return z and its acceleration for steady loads: the rigid body accelerates, the rest stands."""
-    Y, M_R = rigid_mass(body.moments)
+    Y, M_R = body.moments.coupling, body.moments.rigid_mass
     G = modal_forces(body, p)
     z, acceleration = np.zeros(6 + body.n_q), np.zeros(6 + body.n_q)
     acceleration[:6] = np.linalg.solve(M_R, G[:6])

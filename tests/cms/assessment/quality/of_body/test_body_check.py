@@ -9,13 +9,13 @@ from cms.assessment.quality.of_body.descriptions import step_size
 from cms.assessment.quality.of_body.effective_mass import effective_mass, effective_mass_at
 from cms.assessment.quality.of_body.interface_motions import missing_motions
 from cms.assessment.quality.of_body.moments_of_mass import check_moments_of_shapes, masses_at_nodes
-from cms.assessment.quality.reference.free_pencil import free_elastic_modes, free_pencil
 from cms.body.invariants import moments_from_gram
 from cms.errors import BodyError
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets import craig_bampton
 from cms.reduction.basis.damping import ModalDamping
 from cms.reduction.basis.frames import NodalFrame, TisserandFrame
+from cms.reduction.free_pencil import free_elastic_modes, free_pencil
 from cms.reduction.reduction import reduce
 from fe_models.body.couplings.couplings import couple
 from tests.bodies import bar, beam

@@ -215,7 +215,7 @@ def test_own_damping_of_the_body_couples_its_modes_and_changes_the_response():
     eta = np.linalg.solve(K - w**2 * M + 1j * w * C, model.B[2].astype(complex))
     assert_allclose(response(model, np.array([77.0]))[0], -(w**2) * model.E[2] @ eta + model.D[2], rtol=1e-9, atol=1e-9)
     # the same from the whole pencil of the free body with its base held by rows of its own, no elimination
-    from cms.assessment.quality.reference.free_pencil import whole_pencil, whole_port_rows
+    from cms.reduction.free_pencil import whole_pencil, whole_port_rows
 
     pencil, G = whole_pencil(body), whole_port_rows(body, "left")
     n = len(pencil.M)
@@ -227,7 +227,7 @@ def test_own_damping_of_the_body_couples_its_modes_and_changes_the_response():
 
 def test_own_damping_acts_through_two_bases_that_move_against_each_other(part):
     """Oracle: the whole pencil of the free body, both bases held by rows of their own, no elimination."""
-    from cms.assessment.quality.reference.free_pencil import whole_pencil, whole_port_rows
+    from cms.reduction.free_pencil import whole_pencil, whole_port_rows
 
     body = cms.reduce(part, cms.modes.guyan(part), damping=cms.reduction.ModalDamping(0.2))
     bases = bases_of_body(body, {"a": ("left",), "b": ("right",)}, {"a": P})

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from cms.body.reduced_body import ReducedBody
-from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
+from cms.linear_algebra.elastic_pencil import elastic_eigenvectors, stiffness_scale
 from fe_models.body.rigid_motion import rigid_motion_of_points
-from fe_models.foundation.arrays import Array, frozen, tilde
+from fe_models.foundation.arrays import Array, frozen
 
 __all__ = [
     "FreePencil", "free_elastic_modes", "free_pencil", "frequency_distance", "has_inertia", "port_rows", "whole_pencil",
@@ -45,15 +45,8 @@ def whole_pencil(reduced: ReducedBody) -> FreePencil:
 
     M = [m 1, -S~, 1C; S~, J(0), 2C; 1Cᵀ, 2Cᵀ, M*], K = diag(0, K*), D = diag(0, D*).
     """
-    moments, n = reduced.moments, reduced.n_q
-    M = np.zeros((6 + n, 6 + n))
-    M[:3, :3] = moments.m * np.eye(3)
-    M[3:6, :3] = tilde(moments.S)
-    M[:3, 3:6] = M[3:6, :3].T
-    M[3:6, 3:6] = moments.J0
-    M[:3, 6:], M[3:6, 6:] = moments.C1, moments.C2
-    M[6:, :6] = M[:6, 6:].T
-    M[6:, 6:] = reduced.M
+    moments = reduced.moments
+    M = np.block([[moments.rigid_mass, moments.coupling], [moments.coupling.T, reduced.M]])
     K, D = np.zeros_like(M), np.zeros_like(M)
     K[6:, 6:], D[6:, 6:] = reduced.K, reduced.D
     return FreePencil(M, K, D)
@@ -83,7 +76,7 @@ def free_elastic_modes(reduced: ReducedBody) -> tuple[Array, Array, np.ndarray]:
     if not reduced.is_held:
         T = np.vstack([-np.linalg.solve(pencil.M[:6, :6], pencil.M[:6, 6:]), T])
     G_M = T.T @ pencil.M @ T
-    Z, is_massive = elastic_eigenvectors(reduced.K, (G_M + G_M.T) / 2, stiffness_scale(reduced))
+    Z, is_massive = elastic_eigenvectors(reduced.K, (G_M + G_M.T) / 2, stiffness_scale(reduced.K, reduced.M))
     omega2 = np.einsum("kq,kl,lq->q", Z, reduced.K, Z)
     order = np.lexsort((omega2, np.logical_not(is_massive)))
     return omega2[order], T @ Z[:, order], is_massive[order]
@@ -112,16 +105,9 @@ def frequency_distance(own: Array, stored: Array) -> Array:
 
 def has_inertia(reduced: ReducedBody) -> bool:
     """Return whether the rigid body has mass and inertia about every axis, from its scaled mass matrix."""
-    M_rr = whole_pencil(reduced).M[:6, :6]
+    M_rr = reduced.moments.rigid_mass
     size = np.sqrt(np.maximum(np.diag(M_rr), 0.0))
     return bool((size > 0).all() and np.linalg.eigvalsh(M_rr / np.outer(size, size))[0] > NO_INERTIA)
-
-
-def stiffness_scale(reduced: ReducedBody) -> float:
-    """Return the smallest positive K_kk / M_kk of the modes [1/s²]; 1 if there is none."""
-    mass, stiffness = np.diag(reduced.M), np.diag(reduced.K)
-    has_both = (mass > 0) & (stiffness > 0)
-    return float((stiffness[has_both] / mass[has_both]).min()) if has_both.any() else 1.0
 
 
 def port_rows(reduced: ReducedBody, name: str) -> Array:
