@@ -9,7 +9,7 @@ import inspect
 import sys
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, is_dataclass
 from functools import cache, wraps
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, cast, get_args, get_origin, get_type_hints
@@ -378,8 +378,30 @@ def refused_by(own: Callable[[Any], None] | None, subject: Any) -> None:
             raise  # other errors are ignored: the check was not written for a value of this kind
 
 
+def name_unknown_fields(kind: type) -> None:
+    """Let the constructor of a data class raise `TypeError` with the nearest field for an unknown keyword."""
+    own = vars(kind).get("__init__")
+    if own is None or hasattr(own, "__wrapped__"):
+        return
+    names = [each.name for each in fields(kind) if each.init]
+
+    @wraps(own)
+    def init(self: Any, *args: Any, **kwargs: Any) -> None:
+        try:
+            own(self, *args, **kwargs)
+        except TypeError:
+            unknown = [name for name in kwargs if name not in names]
+            if not unknown:
+                raise
+            raise TypeError(f"{kind.__name__}: no argument {unknown[0]!r}{nearest(unknown[0], names)}") from None
+
+    kind.__init__ = init  # type: ignore[misc]
+
+
 def at_door(package: str, name: str, found: Any, error: type[Exception]) -> Any:
     """Return a public object of a package; functions are wrapped so that they check arguments by their annotations.
+
+    Data classes answer an unknown keyword as functions do.
 
     Parameters
     ----------
@@ -392,6 +414,8 @@ def at_door(package: str, name: str, found: Any, error: type[Exception]) -> Any:
     error
         Raised if an argument has a wrong kind; Python's `TypeError` if one is missing or has an unknown name.
     """
+    if isinstance(found, type) and is_dataclass(found):
+        name_unknown_fields(found)
     if not inspect.isfunction(found):
         return found
     function: Callable[..., Any] = found
