@@ -230,7 +230,10 @@ class MeshSizeSection(Table):
     """[mesh_size]: largest element size, and adaptation to the geometry."""
 
     size: Positive = Field(description="a number above 0, the largest edge of an element")
-    smallest: Positive | None = Field(None, description="a number above 0, the smallest edge for curved surfaces")
+    smallest: Positive | None = Field(
+        None,
+        description="a number above 0, the smallest edge for curved surfaces and small features; default: 0.05 size",
+    )
     curvature: Annotated[float, Field(ge=0, le=1000)] = Field(
         12.0, description="a number from 3 to 1000, elements around a circle, or 0: the size does not follow curvature"
     )

@@ -421,10 +421,12 @@ class DampingSection(Table):
         None, description="a list of numbers, 0 to 1, of critical damping, one per mode"
     )
     ramp: Annotated[tuple[tuple[float, float], ...], BeforeValidator(ramp_steps, json_schema_input_type=Any)] | None = (
-        Field(None, description="true, or pairs [frequency in Hz, ratio below it]")
+        Field(None, description="pairs [frequency in Hz, ratio below it]; true: [[100, 0.01], [1000, 0.1]]")
     )
-    above: Ratio | None = Field(None, description="a number, 0 to 1, the ratio above the last step of the ramp")
-    heavy: bool = Field(False, description="true or false: whether ratios above 0.2 are meant")
+    above: Ratio | None = Field(
+        None, description="a number, 0 to 1, the ratio above the last step of the ramp; default: 1, critical"
+    )
+    heavy: bool = Field(False, description="true or false: whether ratios above 0.2, other than above, are accepted")
     alpha: Coefficient | None = Field(None, description="a number, 0 or more, of D = alpha M + beta K")
     beta: Coefficient | None = Field(None, description="a number, 0 or more, of D = alpha M + beta K")
     file: Annotated[Path, BeforeValidator(existing_file())] | None = Field(

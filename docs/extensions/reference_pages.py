@@ -193,7 +193,7 @@ def fields_page() -> str:
     lines = [
         "# Fields of decks",
         "",
-        "These tables drive the readers. What the body has of them is on [decks](../deck_fields.md).",
+        "These tables drive the readers. [Decks](../deck_fields.md) says what the body has of each card.",
         "",
         field_tables(),
         "",
@@ -209,7 +209,7 @@ def formats_page() -> str:
     lines = [
         "# All formats",
         "",
-        "`cms formats` prints the same tables; [formats](../formats.md) says how they are used.",
+        "`cms formats` prints the same tables. [Formats](../formats.md) says how to use them.",
         "",
     ]
     return "\n".join([*lines, cms.cli.exchange.markdown_tables(), ""])

@@ -47,7 +47,9 @@ class PlaneSection(Table):
 
     point: Vector3 = Field(description="a point of the plane, [x, y, z]")
     normal: Vector3 = Field(description="a direction normal to the plane, [x, y, z]")
-    tolerance: Positive | None = Field(None, description="a number above 0, the largest distance of a node")
+    tolerance: Positive | None = Field(
+        None, description="a number above 0, the largest distance of a node; default: 1e-6 of the size of the body"
+    )
 
 
 class CylinderSection(Table):
@@ -57,7 +59,9 @@ class CylinderSection(Table):
     axis: Vector3 = Field(description="the direction of the axis, [x, y, z]")
     radius: Positive = Field(description="a number above 0, the radius")
     span: Range | None = Field(None, description="two numbers, [from, to] along the axis, measured from point")
-    tolerance: Positive | None = Field(None, description="a number above 0, the largest distance from the surface")
+    tolerance: Positive | None = Field(
+        None, description="a number above 0, the largest distance from the surface; default: 1e-3 of the radius"
+    )
 
 
 class BoxSection(Table):
