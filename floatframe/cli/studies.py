@@ -31,7 +31,7 @@ def sweep_command(
         typer.Option(
             "--output",
             "-o",
-            help="A table (.csv, .json, .mat, .npz, .parquet) or picture (.png, .svg, .pdf); repeatable.",
+            help="A page (.html), table (.csv, .json, .mat, .npz, .parquet) or picture (.png, .svg, .pdf); repeatable.",
         ),
     ] = [],  # noqa: B006
     journal: Journal = None,
@@ -57,10 +57,12 @@ def sweep_command(
     """
     from dataclasses import replace
 
+    from fe_models.foundation.documents.html import html_page
     from fe_models.foundation.tasks.workers import tasks_of
     from floatframe.design.studies.study import run_study
     from floatframe.design.studies.study_file import read_study
     from floatframe.design.studies.study_plots import plot_study
+    from floatframe.design.studies.study_report import study_document
     from floatframe.errors import ModelError
     from floatframe.files.system_file.read_system import read_system
 
@@ -68,7 +70,8 @@ def sweep_command(
     inputs = (study, Path(described.system), *read_system(described.system, described.given)[0].files)
     kept = output_path(journal, study.with_suffix(".journal"), ModelError, overwrite_of=inputs, needs_file=True)
     default = [] if json else [study.with_suffix(".csv")]
-    paths = output_files(outputs, default, (*TABLES, *PICTURES), ModelError, overwrite_of=(*inputs, kept))
+    endings = (*TABLES, *PICTURES, ".html")
+    paths = output_files(outputs, default, endings, ModelError, overwrite_of=(*inputs, kept))
     n = sum(1 for _ in described.points())
     asked = described.workers if workers is None else workers
     with stages(remaining=True) as clock, tasks_of(asked, n) as tasks:
@@ -84,7 +87,10 @@ def sweep_command(
         typer.echo(json_text(record), nl=False)
     else:
         print_study(table)
-    write_outputs(paths, table=table.to_table, record=record, figure=lambda: plot_study(table), is_quiet=json)
+    write_outputs(
+        paths, table=table.to_table, record=record, figure=lambda: plot_study(table), is_quiet=json,
+        others={".html": lambda _: html_page(study_document(table)).encode()},
+    )  # fmt: skip
     if table.n_failed == len(table.rows):
         print_error(f"no point gave a result; the first one: {table.rows[0].error}")
         raise typer.Exit(USER_ERROR)
@@ -152,7 +158,7 @@ def compare_command(
         typer.Option(
             "--output",
             "-o",
-            help="A table (.csv, .json, .mat, .npz, .parquet) or picture (.png, .svg, .pdf); repeatable.",
+            help="A page (.html), table (.csv, .json, .mat, .npz, .parquet) or picture (.png, .svg, .pdf); repeatable.",
         ),
     ] = None,
 ) -> None:
@@ -166,19 +172,25 @@ def compare_command(
 
     Example: floatframe compare blade.toml -o blade.csv -o blade.pdf
     """
+    from fe_models.foundation.documents.html import html_page
     from floatframe.design.laboratory.figures import convergence_figure
     from floatframe.design.laboratory.laboratory_file import read_laboratory, run_laboratory
+    from floatframe.design.laboratory.report import laboratory_document
     from floatframe.errors import ModelError
 
     asked = read_laboratory(file)
     default = [file.with_suffix(".csv"), file.with_suffix(".png")]
     inputs = (file, asked.system, asked.job)
-    paths = output_files(outputs, default, (*TABLES, *PICTURES), ModelError, overwrite_of=inputs, needs_file=True)
+    endings = (*TABLES, *PICTURES, ".html")
+    paths = output_files(outputs, default, endings, ModelError, overwrite_of=inputs, needs_file=True)
     with stages() as clock:
         result = run_laboratory(asked, clock)
     print_result(result)
     record = {"name": result.name, "reference": result.reference, "settled": result.settled, "cases": result.table()}
-    write_outputs(paths, table=result.to_table, record=record, figure=lambda: convergence_figure(result), dpi=200)
+    write_outputs(
+        paths, table=result.to_table, record=record, figure=lambda: convergence_figure(result), dpi=200,
+        others={".html": lambda _: html_page(laboratory_document(result)).encode()},
+    )  # fmt: skip
     if all(row.failure for row in result.cases):
         raise typer.Exit(USER_ERROR)
 

@@ -10,7 +10,7 @@ from floatframe.errors import ResultsError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["convergence_figure"]
+__all__ = ["FLOOR", "convergence_figure"]
 
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000", "#999999")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")

@@ -280,7 +280,7 @@ def test_command_and_picture(folder, result, tmp_path, capsys, monkeypatch):
     for name in ("spin.toml", "blade.toml"):
         text = text.replace(f'"{name}"', f'"{folder / name}"')
     file.write_text(text)
-    outputs = [tmp_path / name for name in ("a.csv", "a.json", "a.svg")]
+    outputs = [tmp_path / name for name in ("a.csv", "a.json", "a.svg", "a.html")]
     monkeypatch.setattr("sys.argv", ["floatframe", "compare", str(file), *(w for o in outputs for w in ("-o", str(o)))])
     with pytest.raises(SystemExit) as end:
         main()
@@ -291,6 +291,8 @@ def test_command_and_picture(folder, result, tmp_path, capsys, monkeypatch):
     assert len(rows) == len(record["cases"]) == 4
     assert float(rows[0]["error"]) == pytest.approx(record["cases"][0]["error"])
     assert outputs[2].read_text().startswith("<?xml")
+    page = outputs[3].read_text()
+    assert all(f"{100 * float(row['error']):.3g}" in page for row in rows)
 
 
 def test_the_full_model_is_where_cases_lead(folder, tmp_path):

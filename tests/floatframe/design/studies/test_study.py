@@ -102,7 +102,8 @@ def test_points_of_a_cluster_give_the_table_of_this_process(folder):
 
 def test_points_in_other_processes_give_one_table_csv_json_and_picture(folder):
     for name, workers in (("one", "1"), ("two", "2")):
-        more = ["-o", folder / "out.json", "-o", folder / "out.png"] if name == "two" else []
+        files = ("out.json", "out.png", "out.html") if name == "two" else ()
+        more = [word for file in files for word in ("-o", folder / file)]
         text = sweep(
             folder / "study.toml", "-j", workers, "-o", folder / f"{name}.csv", "--journal", folder / name, *more
         )
@@ -119,6 +120,9 @@ def test_points_in_other_processes_give_one_table_csv_json_and_picture(folder):
     assert table.names == ("gravity", "mass", "swing", "error")
     assert table["swing"].tolist() == [float(row[2]) for row in rows]
     assert (folder / "out.png").read_bytes().startswith(b"\x89PNG")
+    page = (folder / "out.html").read_text()
+    assert "swing [Hz]" in page
+    assert all(f"{float(row[2]):.6g}" in page for row in rows)
 
 
 def test_a_cluster_that_does_not_answer_is_told(folder):
