@@ -193,7 +193,9 @@ def fields_page() -> str:
     lines = [
         "# Fields of decks",
         "",
-        "These tables drive the readers. [Decks](../deck_fields.md) says what the body has of each card.",
+        "These tables drive the readers. [Decks](../deck_fields.md) says what the body has of each card. Repeated "
+        "fields, further fields that are read or left out together, data lines and the numbers in a block are not "
+        "listed one by one.",
         "",
         field_tables(),
         "",

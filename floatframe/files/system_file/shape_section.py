@@ -18,7 +18,12 @@ PLACE = keys_of_fields(Shape, ("geometry",))  #: keys of the place and colour of
 SurfaceFile = Annotated[Path, BeforeValidator(existing_file("surface such as an .stl file"))]
 #: keys of a mesh, instead of nodes and triangles
 OF_FILE = {
-    "file": (SurfaceFile, Field(description="the path of a surface, relative to the system file")),
+    "file": (
+        SurfaceFile,
+        Field(
+            description="the path of a surface (.stl, .obj, .ply, .vtk, .vtu, .msh and others), relative to the file"
+        ),
+    ),
     "scale": (Positive | None, Field(None, description="a factor above 0 on the numbers of the file")),
 }
 
