@@ -1,6 +1,5 @@
 """The commands `cms formats`, `export`, `import` and `recovery`: reduced bodies of other programs."""
 
-import csv
 import json
 from dataclasses import dataclass, replace
 from math import isfinite
@@ -20,6 +19,7 @@ from fe_models.files.read_deck import DECKS
 from fe_models.files.read_matrices import MATRIX_FORMATS
 from fe_models.files.read_mesh import MESH_FORMATS, MESHES
 from fe_models.foundation.formats import Format
+from fe_models.foundation.number_pairs import read_pairs
 from fe_models.foundation.units import UNIT_SYSTEMS
 
 if TYPE_CHECKING:
@@ -278,22 +278,12 @@ def inertia_of(request: ImportRequest) -> "Inertia | None":
 
 def table_of_masses(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Return node numbers and their masses from lines "node, mass" with an optional header."""
-    if not path.is_file():
-        raise ForeignBodyError(f"--nodal-masses {path}: there is no such file")
-    numbers, masses = [], []
-    with path.open(newline="", encoding="utf-8", errors="replace") as file:
-        for k, row in enumerate(csv.reader(file), start=1):
-            if not row or row[0].lstrip().startswith("#"):
-                continue
-            try:
-                number, mass = int(row[0]), float(row[1])
-            except (ValueError, IndexError):
-                if k == 1:
-                    continue  # a header line
-                raise ForeignBodyError(f"{path}, line {k}: expected node, mass, got {','.join(row)[:60]!r}") from None
-            numbers.append(number)
-            masses.append(mass)
-    return np.array(numbers, dtype=np.int64), np.array(masses)
+    table, lines = read_pairs(path, "node and mass", ForeignBodyError, "--nodal-masses")
+    numbers = table[:, 0].astype(np.int64)
+    if (numbers != table[:, 0]).any():
+        k = int(np.argmax(numbers != table[:, 0]))
+        raise ForeignBodyError(f"{path}, line {lines[k]}: expected the number of a node, got {table[k, 0]:g}")
+    return numbers, table[:, 1]
 
 
 def frame_of(request: ImportRequest) -> "Frame | None":

@@ -1,6 +1,5 @@
 """The design file: what `floatframe optimize` reads (docs/optimization.md)."""
 
-import csv
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,6 +9,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.number_pairs import read_pairs
 from fe_models.foundation.parametric_file import read_parametric
 from fe_models.foundation.tasks.workers import WORKERS_HELP
 from fe_models.foundation.toml_file import (
@@ -258,7 +258,7 @@ def read_design(path: str | os.PathLike[str], changes: Mapping[str, Any] | None 
     parameters = tuple(parameter_of(name, section, content, path) for name, section in data.parameters.items())
     objectives = []
     for name, o in data.objectives.items():
-        times, values = (None, None) if o.table is None else read_table(o.table)
+        times, values = (None, None) if o.table is None else read_history(o.table)
         sign = -1.0 if o.goal == "greatest" else 1.0
         objectives.append(
             Quantity(
@@ -313,32 +313,18 @@ def parameter_of(name: str, section: ParameterSection, content: dict[str, Any], 
     )
 
 
-def read_table(path: Path) -> tuple[Array, Array]:
-    """Return times and values of a .csv file, both (n_t,); a first line without numbers is a heading.
+def read_history(path: Path) -> tuple[Array, Array]:
+    """Return times and values of a text file of two columns, both (n_t,).
 
     Raises
     ------
     SystemFileError
         If a line does not contain two finite numbers, or its time does not increase; the message has the line number.
     """
-    rows: list[tuple[float, float]] = []
-    with open(path, newline="", encoding="utf-8-sig", errors="replace") as file:
-        for i, cells in enumerate(csv.reader(file)):
-            if not cells:
-                continue
-            try:
-                t, value = (float(cell) for cell in cells)
-            except ValueError:
-                if i == 0:
-                    continue
-                raise SystemFileError(f"{path}, line {i + 1}: expected t,value, two numbers, got {cells}") from None
-            if not (np.isfinite(t) and np.isfinite(value)):
-                raise SystemFileError(f"{path}, line {i + 1}: expected finite numbers, got {cells}")
-            if rows and t <= rows[-1][0]:
-                before = rows[-1][0]
-                raise SystemFileError(f"{path}, line {i + 1}: expected increasing times, got {t:g} after {before:g}")
-            rows.append((t, value))
-    if not rows:
-        raise SystemFileError(f"{path}: expected lines t,value, got none")
-    table = np.array(rows)
-    return table[:, 0].copy(), table[:, 1].copy()
+    table, lines = read_pairs(path, "t and value", SystemFileError)
+    times = table[:, 0]
+    if not (np.diff(times) > 0).all():
+        k = int(np.argmax(np.diff(times) <= 0)) + 1
+        before = f"{times[k]:g} after {times[k - 1]:g}"
+        raise SystemFileError(f"{path}, line {lines[k]}: expected increasing times, got {before}")
+    return times.copy(), table[:, 1].copy()

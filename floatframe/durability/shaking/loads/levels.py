@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen
-from fe_models.foundation.paths import near_file
+from fe_models.foundation.number_pairs import read_pairs
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.records import checked_fields
 from fe_models.foundation.units import Units
-from fe_models.foundation.words import is_number, nearest, quoted
+from fe_models.foundation.words import nearest, quoted
 from floatframe.durability.shaking.structure.model import STANDARD_GRAVITY, gravity_in
 from floatframe.errors import ModelError
 
@@ -147,30 +147,8 @@ def read_level(path: Path, unit: str, where: str) -> Level:
     ModelError
         If a line is not two numbers, or `Level` refuses it; the message names the line.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise ModelError(f"{where}: {path}: cannot be read: {error.strerror}{near_file(path)}") from error
-    except UnicodeDecodeError:
-        raise ModelError(f"{where}: {path}: expected a text file of two columns, Hz and {unit}") from None
-    rows: list[tuple[float, float]] = []
-    places: list[str] = []
-    for number, line in enumerate(text.splitlines(), start=1):
-        words = line.partition("#")[0].replace(",", " ").replace(";", " ").split()
-        if not words:
-            continue
-        try:
-            f, value = (float(word) for word in words)
-        except ValueError:
-            if not rows and len(words) >= 2 and not is_number(words[0]):
-                continue  # a heading
-            raise ModelError(
-                f"{where}: {path}: line {number}: expected two numbers, Hz and {unit}, got {line[:60]!r}"
-            ) from None
-        rows.append((f, value))
-        places.append(f"{path.name}, line {number}")
-    table = np.array(rows).reshape(-1, 2)
-    return Level(table[:, 0], table[:, 1], unit, where, places)
+    table, lines = read_pairs(path, f"Hz and {unit}", ModelError, where)
+    return Level(table[:, 0], table[:, 1], unit, where, [f"{path.name}, line {number}" for number in lines])
 
 
 def known_unit(unit: str, where: str) -> str:

@@ -169,7 +169,7 @@ def test_matrices_without_rows_or_places_ask_for_them(tmp_path):
         (["--mesh", "a.msh"], "--mesh and --density belong together"),
         (["--interface", "hub"], "expected NAME=3,11,19"),
         (["--interface", "hub=a"], "expected node numbers with commas between"),
-        (["--nodal-masses", "none.csv"], "there is no such file"),
+        (["--nodal-masses", "none.csv"], "--nodal-masses: none.csv: cannot be read: No such file"),
         (["--frame", "mean"], "unknown frame"),
         (["--damping", "0.3"], "--heavy of a command"),
     ],
@@ -200,7 +200,7 @@ def test_a_table_of_nodal_masses_completes_a_superelement(outboard, tmp_path):
     assert "do not belong to this body" in " ".join(result.output.split())
     table.write_text("node,mass\n3,1.0\nx\n")
     result = run_cms(*words)
-    assert "masses.csv, line 3: expected node, mass" in " ".join(result.output.split())
+    assert "masses.csv, line 3: expected two numbers, node and mass" in " ".join(result.output.split())
 
 
 def test_a_superelement_of_ansys_has_its_mass_and_the_frequencies_of_its_matrices():

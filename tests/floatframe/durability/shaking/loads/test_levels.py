@@ -65,6 +65,12 @@ def test_bad_files_are_refused_with_their_line(tmp_path):
         read_level(path, "g2/Hz", "level")
     path.write_text("20 0.01\n30\t0.02 # end\n")
     assert_allclose(read_level(path, "g2/Hz", "level").values, [0.01, 0.02])
+    path.write_text("20 0.01\n30 inf\n")
+    with pytest.raises(ModelError, match="line 2: expected finite numbers"):
+        read_level(path, "g2/Hz", "level")
+    path.write_text("# nothing\n")
+    with pytest.raises(ModelError, match="expected lines of two numbers, Hz and g2/Hz, got none"):
+        read_level(path, "g2/Hz", "level")
     with pytest.raises(ModelError, match="cannot be read"):
         read_level(tmp_path / "none.csv", "g2/Hz", "level")
 
