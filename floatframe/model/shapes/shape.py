@@ -46,7 +46,8 @@ class Shape:
     #: position of its origin [m] in axes of the body (flexible: of its mesh), the interface, or the ground
     position: Array = field(default_factory=lambda: np.zeros(3))
     rotation_vector: Array = field(default_factory=lambda: np.zeros(3))  #: rotation relative to these axes, (3,) [rad]
-    #: colour "#rrggbb" or a name in `NAMED`; None: the default for its kind, else for its body
+    #: colour "#rrggbb", or steel, aluminium, dark, black, white, red, orange, yellow, green, blue or gold; None: the
+    #: default for its kind, else for its body
     color: str | None = None
     opacity: float = 1.0  #: opacity, above 0 and at most 1
     interface: str | None = None  #: interface of a flexible body that carries the shape; None: the body frame

@@ -143,9 +143,10 @@ def interface_load_rows(small: SmallMotions, body: FlexibleBody) -> list[Rows]:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class InterfaceForceSensor:
-    """The total force and moment on a flexible body at an interface, from joints, springs and point forces.
+    """Total force and moment (force x, ..., moment size) on a flexible body at an interface.
 
-    The moment is about the point of the interface. Inputs of a linearised system that act there are included.
+    They come from joints, springs, point forces, and inputs of a linearised system that act there. The moment is about
+    the point of the interface.
 
     Parameters
     ----------

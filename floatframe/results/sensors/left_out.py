@@ -237,7 +237,7 @@ def left_out(system: System, trajectory: Trajectory, names: Sequence[str] | None
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class LeftOutSensor:
-    """Estimate of the strain energy that the modes of a flexible body left out.
+    """Strain energy that the modes of a flexible body left out (energy), that of its modes (strain), and their share.
 
     Parameters
     ----------

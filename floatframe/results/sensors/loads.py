@@ -35,7 +35,7 @@ ENERGIES = (*Energies.__dataclass_fields__, "total", "balance")
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class ReactionSensor:
-    """Force and moment that a joint or spring-damper exerts on its marker A, in ground axes or marker axes.
+    """Force and moment (force x, ..., moment size) that a joint or spring-damper exerts on its marker A.
 
     Parameters
     ----------

@@ -149,7 +149,7 @@ def frame_marker(system: System, where: str, marker: Marker) -> MarkerData:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class PlaceSensor:
-    """Position, velocity, acceleration, rotation vector or angular velocity of a marker.
+    """Position, velocity, acceleration, rotation vector or angular velocity of a marker: x, y, z, size.
 
     In ground axes; with `relative_to`, relative to that marker and in its axes, with its own motion subtracted.
 
@@ -342,7 +342,7 @@ class AngleSensor:
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
 class DisplacementSensor:
-    """Elastic displacement of an interface or node of a flexible body in body axes, from all modes.
+    """Elastic displacement (x, y, z, size) of an interface or node of a flexible body in body axes, from all modes.
 
     Parameters
     ----------
