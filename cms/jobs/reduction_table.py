@@ -49,7 +49,7 @@ SET_OPTIONS = (
     "n_modes", "cutoff", "verify", "free", "loads", "neighbours", "n_blocks", "shifts", "tolerance", "band",
     "load_cases", "damping_ratio", "n_rich", "functions", "n_axial", "n_bending", "n_torsion", "axis", "point",
     "poisson", "columns", "columns_over", "inputs", "outputs", "inertia_relief", "cutoff_factor",
-    "workers",
+    "workers", "static", "max_iterations",
 )  # fmt: skip
 #: keys that belong to some mode sets only
 AUTO = "auto"  #: text in place of a number of modes: use the fewest modes that meet `error` over `band`
@@ -247,13 +247,19 @@ class ReductionSection(Table):
     workers: WorkersKey | None = Field(None, description=f"where subtrees are eliminated: {WORKERS_HELP}")
     load_cases: bool | None = Field(None, description="true or false: whether load cases are among the Krylov loads")
     damping_ratio: Annotated[float, Field(ge=0)] | None = Field(
-        None, description="a number, 0 or more, of critical damping, for balancing"
+        None, description="a number, 0 or more, of critical damping, for balancing and h2-optimal"
     )
     n_rich: Annotated[int, Field(ge=1)] | None = Field(
-        None, description="a whole number, 1 or more, of free modes to balance"
+        None, description="a whole number, 1 or more, of free modes from which directions are chosen"
     )
     inputs: Places | None = Field(None, description='a list of interfaces, or with a component, such as "big_end uz"')
     outputs: Places | None = Field(None, description='a list of interfaces, or with a component, such as "big_end uz"')
+    static: bool | None = Field(
+        None, description="true or false: whether h2-optimal has the static responses to interface loads"
+    )
+    max_iterations: Annotated[int, Field(ge=1)] | None = Field(
+        None, description="a whole number, 1 or more, of iterations of h2-optimal"
+    )
     functions: choice("functions", lambda: tuple(AXIS_FUNCTIONS)) | None = Field(  # type: ignore[valid-type]
         None, description=f"one of {', '.join(AXIS_FUNCTIONS)}"
     )

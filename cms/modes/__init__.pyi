@@ -21,6 +21,7 @@ from .mode_sets.free_interface import herting as herting
 from .mode_sets.free_interface import macneal as macneal
 from .mode_sets.free_interface import normal_modes as normal_modes
 from .mode_sets.given_columns import user_basis as user_basis
+from .mode_sets.h2_optimal import h2_optimal as h2_optimal
 from .mode_sets.krylov import krylov as krylov
 from .mode_sets.mesh_field import CoupledField as CoupledField
 from .mode_sets.mesh_field import coupled_field as coupled_field

@@ -33,6 +33,7 @@ UNITS = ("m-kg-s", "mm-t-s", "mm-kg-ms", "in-slinch-s")
 SETS = (
     "craig-bampton", "craig-bampton-ir", "rubin", "macneal", "craig-chang", "dual-craig-bampton", "herting", "krylov",
     "benfield-hruda", "attachment", "unrestrained-attachment", "guyan", "normal", "balanced-truncation",
+    "h2-optimal",
 )  # fmt: skip
 COUNTED = frozenset(MODE_SETS) - {"guyan"}  #: sets with a number of modes
 CELLS = ("hexahedron", "tetra", "wedge", "hexahedron20", "tetra10")

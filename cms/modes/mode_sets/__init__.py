@@ -16,6 +16,7 @@ from cms.modes.mode_sets.classical import (
 )
 from cms.modes.mode_sets.free_interface import craig_chang, dual_craig_bampton, herting, macneal, normal_modes, rubin
 from cms.modes.mode_sets.given_columns import user_basis
+from cms.modes.mode_sets.h2_optimal import h2_optimal
 from cms.modes.mode_sets.krylov import krylov
 from cms.modes.mode_sets.multilevel import multilevel
 from fe_models.door import Registry
@@ -31,6 +32,7 @@ __all__ = [
     "craig_chang",
     "dual_craig_bampton",
     "guyan",
+    "h2_optimal",
     "herting",
     "krylov",
     "macneal",
@@ -58,6 +60,7 @@ MODE_SETS: Registry[Callable[..., ModeSet]] = Registry("cms.mode_sets", {
     "normal": normal_modes,
     "krylov": krylov,
     "balanced-truncation": balanced_truncation,
+    "h2-optimal": h2_optimal,
     "assumed-modes": assumed_modes,
     "user-basis": user_basis,
 }, ModeSetError)  # fmt: skip

@@ -1,24 +1,18 @@
 """Balanced truncation of the second-order system: directions ranked by controllability and observability."""
 
-import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg as la
 
-from cms.errors import EigenError, ModeSetError
-from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
-from cms.linear_algebra.independent import independent_columns
-from cms.linear_algebra.solvers.eigen import EigenResult
+from cms.errors import ModeSetError
 from cms.modes.families.families import Families, body_of, families_of
-from cms.modes.families.receptance import boundary_scale
-from cms.modes.families.static_modes import boundary_names
 from cms.modes.mode_set import Block, ModeSet, mode_set, require_interfaces, rigid_block
+from cms.modes.mode_sets.elastic_system import check_options, chosen_dofs, damping_description, elastic_system
 from fe_models.body.fe_body import FEBody
-from fe_models.foundation.arrays import Array, IntArray, frozen
-from fe_models.foundation.tall.columns import combine, gram
-from fe_models.foundation.words import nearest
+from fe_models.foundation.arrays import Array, frozen
+from fe_models.foundation.tall.columns import combine
 
 __all__ = ["BalancedSystem", "balance", "balanced_truncation"]
 
@@ -151,15 +145,6 @@ def in_turn(reached: Array, seen: Array) -> Array:
 # balanced -------------------------------------------------------------------------------------------------------------
 
 
-log = logging.getLogger(__name__)
-
-FEWEST_RICH = 60  #: smallest number of free modes of the rich basis
-LOWER_PART = 0.6  #: default number of modes in the rich basis of a small body, as a share of all its modes
-RICH_FACTOR = 3  #: number of free modes of the rich basis per requested mode
-#: length of a residual attachment mode relative to the attachment mode, below which it is rounding
-NOTHING_LEFT = 1e-7
-STIFF = 1e-12  #: compliance of a boundary dof relative to the largest, below which it is rounding
-FEWEST_FOUND = 4  #: smallest number of free modes that balancing needs
 REPORTED = 12  #: number of singular values reported in the options of the set; its data contain all of them
 
 
@@ -217,50 +202,25 @@ def balanced_truncation(
     ----------
     .. [1] Koutsovasilis & Beitelschmidt (2008), docs/bibliography.md, compare such sets; derived in docs/theory.md §3.
     """
-    if (n_modes is None) == (tolerance is None):
-        raise ModeSetError(
-            f"balanced_truncation: expected either n_modes or tolerance, got n_modes = {n_modes}, tolerance = "
-            f"{tolerance}"
-        )
-    if n_modes is not None and n_modes < 0:
-        raise ModeSetError(f"balanced_truncation: n_modes = {n_modes}; expected 0 or more")
-    if tolerance is not None and not 0 < tolerance < 1:
-        raise ModeSetError(f"balanced_truncation: tolerance = {tolerance}; expected a number between 0 and 1")
-    if not 0 <= damping_ratio <= 1:
-        raise ModeSetError(f"balanced_truncation: damping_ratio = {damping_ratio}; expected 0 to 1 (0.01 is 1 %)")
-    if n_rich is not None and n_rich < 1:
-        raise ModeSetError(f"balanced_truncation: n_rich = {n_rich}; expected 1 or more")
+    check_options("balanced_truncation", n_modes, tolerance, damping_ratio, n_rich)
     source, body = body, body_of(body)
     body.require_coupled()
     require_interfaces("balanced_truncation", body)
     with families_of(source) as families:
-        rich = rich_basis(families, n_rich, max(FEWEST_RICH, RICH_FACTOR * (n_modes or 0)))
-        n = len(rich.omega2)
-        if n_modes is not None and n_modes > n:
-            raise ModeSetError(
-                f"balanced_truncation: n_modes = {n_modes}, but the rich basis of body {body.name!r} has {n} elastic "
-                "columns with mass; choose fewer, or a larger n_rich"
-            )
-        D = np.diag(2 * damping_ratio * np.sqrt(rich.omega2))
-        if body.D is not None:
-            D = D + gram(rich.Phi, body.D @ rich.Phi)
-        into = chosen_dofs(body, "inputs", inputs)
-        out_of = into if outputs is None else chosen_dofs(body, "outputs", outputs)
-        at_b = rich.Phi[body.b]
-        compliance = np.einsum("bk,bk->b", at_b, at_b / rich.omega2)
-        levered = compliance * boundary_scale(body) ** 2
-        is_elastic = levered > STIFF * levered.max()
-        scale = np.where(is_elastic, 1 / np.sqrt(np.where(is_elastic, compliance, 1.0)), 0.0)
-        loads = (scale[:, None] * at_b).T
+        system = elastic_system("balanced_truncation", families, n_modes, n_rich=n_rich, damping_ratio=damping_ratio)
+        n = len(system.omega2)
+        into = chosen_dofs("balanced_truncation", body, "inputs", inputs)
+        out_of = into if outputs is None else chosen_dofs("balanced_truncation", body, "outputs", outputs)
         is_symmetric = np.array_equal(into, out_of)
-        system = balance(rich.omega2, D, loads[:, into], None if is_symmetric else loads[:, out_of])
-        sigma = system.position_velocity
+        responses = None if is_symmetric else system.B[:, out_of]
+        balanced = balance(system.omega2, system.D, system.B[:, into], responses)
+        sigma = balanced.position_velocity
         sides = 1 if is_symmetric else 2  # directions per singular value: one for loads and one for responses
         if n_modes is None:
             left = 1 - np.cumsum(sigma) / sigma.sum()
             n_modes = min(n, sides * (int(np.argmax(left <= (tolerance or 0.0))) + 1))
         columns = Block(
-            combine(rich.Phi, system.T[:, :n_modes]),
+            combine(system.Phi, balanced.T[:, :n_modes]),
             [f"balanced {k + 1}" for k in range(n_modes)],
             ["balanced"] * n_modes,
         )
@@ -269,8 +229,8 @@ def balanced_truncation(
             "rich basis": f"{n} elastic columns",
             "inputs": ", ".join(inputs) if inputs is not None else "all interfaces",
             "outputs": ", ".join(outputs) if outputs is not None else "as the inputs",
-            "damping": f"ratio {damping_ratio!r}" + (" and that of the body" if body.D is not None else ""),
-            "Hankel singular values": _listed(system.hankel),
+            "damping": damping_description(body, damping_ratio),
+            "Hankel singular values": _listed(balanced.hankel),
             "position-velocity singular values": _listed(sigma),
             "part left out": f"{sigma[n_modes // sides :].sum() / sigma.sum():.3g}",
         }
@@ -280,79 +240,8 @@ def balanced_truncation(
             [rigid_block(families, families.Psi_R, "rigid-body"), columns],
             options=options,
         )
-        data = {"hankel": system.hankel, "hankel signs": system.signs, "position-velocity": sigma}
+        data = {"hankel": balanced.hankel, "hankel signs": balanced.signs, "position-velocity": sigma}
         return replace(modes, data=data)
-
-
-def chosen_dofs(body: FEBody, key: str, names: Sequence[str] | None) -> IntArray:
-    """Return the named boundary dofs, ascending, (n,); all boundary dofs if no names are given."""
-    labels = [label.removeprefix("at ") for label in boundary_names(body, "at")[0]]
-    if names is None:
-        return np.arange(len(labels), dtype=np.int64)
-    if isinstance(names, str) or not len(names):
-        raise ModeSetError(f"balanced_truncation: {key}: expected a list of interfaces, or such as 'pin uz'")
-    chosen: set[int] = set()
-    for name in names:
-        found = {k for k, label in enumerate(labels) if label == name or label.startswith(f"{name} ")}
-        if not found:
-            choices = [interface.name for interface in body.interfaces] + labels
-            raise ModeSetError(f"balanced_truncation: {key}: {name!r} is no interface{nearest(name, choices)}")
-        chosen |= found
-    return np.array(sorted(chosen), dtype=np.int64)
-
-
-@dataclass(frozen=True, eq=False)
-class RichBasis:
-    """M-orthonormal, K-diagonal elastic columns of the free body."""
-
-    Phi: Array  #: displacement columns, (n_dof, n)
-    omega2: Array  #: squared angular frequencies, (n,) [1/s²]
-
-
-def rich_basis(families: Families, n_asked: int | None, n_default: int) -> RichBasis:
-    """Return free modes with residual attachment modes (the span of Rubin's set), without massless directions.
-
-    A small body has fewer modes than the default. Its highest modes are useless, and reduce the solver's accuracy.
-    """
-    body = families.body
-    n_most = int((body.M.diagonal() > 0).sum()) - families.Psi_R.shape[1]
-    n_free = min(n_asked, n_most) if n_asked is not None else min(n_default, int(LOWER_PART * n_most))
-    modes = most_free_modes(families, max(1, n_free))
-    residual = families.residual_attachment(modes)
-    is_left = _stiffness(body, residual) > NOTHING_LEFT**2 * _stiffness(body, families.Psi_U)
-    V = np.hstack([modes.Phi, residual[:, is_left]])
-    omega2_1 = float(modes.omega2[0])
-    Q, _ = independent_columns(V, body, omega2_1)
-    G_K = gram(Q.X, Q.KX)
-    Z, is_massive = elastic_eigenvectors(G_K, gram(Q.X, Q.MX), omega2_1)
-    Z = Z[:, is_massive]
-    return RichBasis(combine(Q.X, Z), np.einsum("kq,kl,lq->q", Z, G_K, Z))
-
-
-def most_free_modes(families: Families, n: int) -> EigenResult:
-    """Return n free modes, or as many as the eigensolver can compute to its tolerance; the highest may not converge.
-
-    Raises
-    ------
-    ModeSetError
-        If it finds no modes.
-    """
-    while True:
-        try:
-            return families.free_modes(n_modes=n)
-        except EigenError as error:
-            if n <= FEWEST_FOUND:
-                raise ModeSetError(
-                    f"balanced_truncation: body {families.body.name!r}: the rich basis needs at least {n} free modes, "
-                    f"which were not found: {error}"
-                ) from error
-            log.info("balanced truncation: %d free modes were not found (%s); fewer are tried", n, error)
-            n = max(FEWEST_FOUND, 2 * n // 3)
-
-
-def _stiffness(body: FEBody, u: Array) -> Array:
-    """Return twice the strain energy of each column, (k,)."""
-    return np.einsum("nk,nk->k", u, body.K @ u)
 
 
 def _listed(values: Array) -> str:

@@ -12,7 +12,7 @@ from cms.jobs.job import Job, ReductionSection
 from cms.jobs.mode_set_of_job import job_mode_set
 from cms.jobs.reduction_table import MEASURE_NAMES
 from cms.modes.centrifugal import centrifugal_loads
-from cms.modes.mode_sets import assumed_modes, balanced_truncation, craig_bampton, krylov
+from cms.modes.mode_sets import assumed_modes, balanced_truncation, craig_bampton, h2_optimal, krylov
 from cms.modes.mode_sets.extra_columns import with_centrifugal, with_load_cases
 from cms.reduction.reduction import reduce
 from fe_models.body.couplings.couplings import couple
@@ -53,6 +53,14 @@ def same(found, expected):
         (
             {"set": "balanced-truncation", "n_modes": 7, "damping_ratio": 0.03, "n_rich": 20},
             lambda body: balanced_truncation(body, n_modes=7, damping_ratio=0.03, n_rich=20),
+        ),
+        (
+            {"set": "h2-optimal", "n_modes": 3, "damping_ratio": 0.03, "static": False, "inputs": ["left uz"]},
+            lambda body: h2_optimal(body, n_modes=3, damping_ratio=0.03, static=False, inputs=["left uz"]),
+        ),
+        (
+            {"set": "h2-optimal", "tolerance": 0.5, "n_rich": 20, "max_iterations": 30},
+            lambda body: h2_optimal(body, tolerance=0.5, n_rich=20, max_iterations=30),
         ),
         (
             {"set": "assumed-modes", "n_modes": 3, "n_torsion": 4, "functions": "splines", "axis": [1, 0, 0]},
@@ -130,6 +138,8 @@ def test_a_job_reduces_interfaces_of_nodes_before_it_counts_modes():
         ({"n_modes": 3, "shifts": [0]}, "mode set 'craig-bampton' has no option shifts"),
         ({"set": "krylov", "n_blocks": 1, "shifts": []}, "a list of frequencies, 0 or more, in Hz"),
         ({"set": "krylov", "n_blocks": 0}, "greater than or equal to 1"),
+        ({"set": "h2-optimal", "n_modes": 3, "max_iterations": 0}, "greater than or equal to 1"),
+        ({"set": "rubin", "n_modes": 3, "static": False}, "mode set 'rubin' has no option static"),
         ({"n_modes": 3, "extra": ["load-case"]}, "unknown extra columns 'load-case'; did you mean 'load-cases'"),
         ({"n_modes": 3, "extra": []}, "each once, of load-cases, centrifugal"),
         ({"n_modes": 3, "interface_modes": 2, "interface_cutoff": 3.0}, "either interface_modes or interface_cutoff"),
