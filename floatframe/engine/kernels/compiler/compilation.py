@@ -4,7 +4,7 @@
     loops           an inner function whose loops run over modes or matrices
     matrix_loops    a long function of this kind with many callers
     small           an inner function that is inlined: a few operations, or a part of one function
-    view            an inner function that returns a part of an array
+    view            an inlined function that returns parts of arrays
     entry           a function that Python calls
     kept_entry      an entry with one signature, which is compiled in each process if it cannot be cached on disk
 

@@ -549,7 +549,7 @@ inner = decorator(InnerCompiler)  #: decorator for functions that only compiled 
 small = decorator(SmallCompiler)  #: the same for functions with few operations
 loops = decorator(LoopCompiler)  #: the same for functions with loops over modes or matrices (5)
 matrix_loops = decorator(MatrixLoopCompiler)  #: the same for long functions with many callers
-view = decorator(LoopCompiler, _nrt=True)  #: the same for functions that return a part of an array
+view = decorator(SmallCompiler, _nrt=True)  #: the same for functions that return parts of arrays
 of_law = decorator(LawCompiler)  #: decorator of functions of laws
 
 

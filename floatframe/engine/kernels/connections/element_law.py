@@ -25,12 +25,28 @@ from fe_models.foundation.arrays import Array
 from floatframe.engine.kernels.compiler.compilation import inner, view
 from floatframe.engine.kernels.compiler.user_call import call_law
 from floatframe.engine.kernels.connections.user_force import note_no_number, put_state_derivatives, state_rows
+from floatframe.engine.kernels.dense import matrix_at
 from floatframe.engine.kernels.marker import marker_acceleration
 from floatframe.engine.kernels.rotation import exp_matrix
-from floatframe.engine.kernels.vector import add, dot, matrix, norm, product, put, put_sum, scaled, vector
+from floatframe.engine.kernels.vector import (
+    add,
+    copy,
+    dot,
+    matrix,
+    norm,
+    product,
+    put,
+    put_matrix,
+    put_sum,
+    scaled,
+    vector,
+)
 from floatframe.model.joints.rows.kinds import NOTHING, POSITION, VELOCITY
 
-__all__ = ["FIRST", "law_derivatives", "law_power", "law_rates", "law_rows", "law_values", "n_results", "note_stops"]
+__all__ = [
+    "FIRST", "law_derivatives", "law_power", "law_rates", "law_results", "law_rows", "law_values", "motion_inputs",
+    "note_stops", "unknown_inputs",
+]  # fmt: skip
 
 #: time steps of difference quotients if the time scale of a law is unknown: number of trials, the first step
 #: relative to `REACH`, and the ratio of successive steps
@@ -44,34 +60,77 @@ FOURTH_SECOND = (0.0, -1 / 12, 16 / 12, -30 / 12, 16 / 12, -1 / 12, 0.0)
 SECOND = (2 / 180, -27 / 180, 270 / 180, -490 / 180, 270 / 180, -27 / 180, 2 / 180)
 
 
+class MotionInputs(NamedTuple):
+    """The motion of one marker in the inputs of a law."""
+
+    r: Array  #: position, (3,)
+    A: Array  #: axes, (3, 3)
+    v: Array  #: velocity, (3,)
+    omega: Array  #: angular velocity, (3,)
+    accelerations: Array  #: acceleration and angular acceleration, (6,) if the law depends on them, else (0,)
+
+
+class UnknownInputs(NamedTuple):
+    """The unknowns of a law in its inputs."""
+
+    states: Array  #: (n_z,)
+    multipliers: Array  #: (n_lam,)
+
+
+class LawResults(NamedTuple):
+    """The results of a law."""
+
+    wrench: Array  #: on each marker, (n, 6)
+    rates: Array  #: of the states, (n_z,)
+    equations: Array  #: of the multipliers, (n_lam,)
+    outputs: Array  #: for results alone, (n_seen,)
+
+
+@view
+def motion_inputs(head, inputs, m):
+    """Return the motion of marker m of a law in its inputs."""
+    own = matrix_at(inputs, 1, head[0], head[1])[m]
+    return MotionInputs(own[:3], own[3:12].reshape((3, 3)), own[12:15], own[15:18], own[18:])
+
+
+@view
+def unknown_inputs(head, inputs):
+    """Return the unknowns of a law in its inputs."""
+    own = inputs[1 + head[0] * head[1] :]
+    return UnknownInputs(own[: head[2]], own[head[2] : head[2] + head[3]])
+
+
+@view
+def law_results(head, results):
+    """Return the parts of the results of a law."""
+    own = results[6 * head[0] :]
+    end = head[2] + head[3]
+    return LawResults(matrix_at(results, 0, head[0], 6), own[: head[2]], own[head[2] : end], own[end : end + head[4]])
+
+
 @inner
 def law_inputs(model, work, c):
     """Write t, the motion of the markers, states and multipliers into work.laws.inputs."""
-    i, first = model.connections.item[c], model.connections.a[c]
-    n, width = model.laws.head[i, 0], model.laws.head[i, 1]
-    x, markers = work.laws.inputs, work.markers
-    x[0] = work.state.time
-    for m in range(n):
-        o = 1 + m * width
-        put(x, o, vector(markers.r[first + m]))
-        for r in range(3):
-            for k in range(3):
-                x[o + 3 + 3 * r + k] = markers.A[first + m, r, k]
-        put(x, o + 12, vector(markers.v[first + m]))
-        put(x, o + 15, vector(markers.omega[first + m]))
-        a = model.markers.accelerated[first + m]
+    i, first, markers = model.connections.item[c], model.connections.a[c], work.markers
+    head = model.laws.head[i]
+    work.laws.inputs[0] = work.state.time
+    for k in range(head[0]):
+        m, x = first + k, motion_inputs(head, work.laws.inputs, k)
+        put(x.r, 0, vector(markers.r[m]))
+        put_matrix(x.A, markers.A[m])
+        put(x.v, 0, vector(markers.v[m]))
+        put(x.omega, 0, vector(markers.omega[m]))
+        a = model.markers.accelerated[m]
         if a >= 0:
-            marker_acceleration(model, work, first + m, markers.acceleration[a])
-            put(x, o + 18, vector(markers.acceleration[a]))
-            put(x, o + 21, vector(markers.acceleration[a, 3:]))
-    o = 1 + n * width
-    k = model.connections.w0[c] + model.laws.row0[i + 1] - model.laws.row0[i]
-    for s in range(model.laws.head[i, 2]):
-        x[o + s] = work.state.w[k + 3 * s]
-    o += model.laws.head[i, 2]
-    k += 3 * model.laws.head[i, 2]
-    for j in range(model.laws.head[i, 3]):
-        x[o + j] = work.state.w[k + j]
+            marker_acceleration(model, work, m, markers.acceleration[a])
+            copy(markers.acceleration[a], x.accelerations)
+    own = work.state.w[model.connections.w0[c] : model.connections.w0[c + 1]]
+    w = by_unknowns(own, model.laws.row0[i + 1] - model.laws.row0[i], head[2])
+    unknowns = unknown_inputs(head, work.laws.inputs)
+    for s in range(head[2]):
+        unknowns.states[s] = w.states[s, 0]
+    for j in range(head[3]):
+        unknowns.multipliers[j] = w.multipliers[j]
 
 
 @inner
@@ -90,9 +149,9 @@ def n_results(head):
 @inner
 def note_stops(model, work, i):
     """Record the first output of law i that ends the run."""
-    first = n_results(model.laws.head[i])
+    own = law_results(model.laws.head[i], work.laws.outputs)
     for k in range(model.laws.stop0[i], model.laws.stop0[i + 1]):
-        if work.laws.outputs[first + model.laws.stop[k]] > 0.0 and work.counted.stopped == 0:
+        if own.outputs[model.laws.stop[k]] > 0.0 and work.counted.stopped == 0:
             work.counted.stopped = k + 1
 
 
@@ -107,7 +166,7 @@ def law_values(model, work, c):
 def law_rows(model, work, c, c_k):
     """Write the residual of element c, and its wrenches."""
     i, k = model.connections.item[c], model.connections.w0[c]
-    laws, w, g, out = model.laws, work.state.w, work.connections.g, work.laws.outputs
+    laws, w, g = model.laws, work.state.w, work.connections.g
     for m in range(model.connections.a[c], model.connections.a[c] + laws.head[i, 0]):
         for part in range(0, 6, 3):
             place = model.markers.force[m] if part == 0 else model.markers.moment[m]
@@ -116,18 +175,18 @@ def law_rows(model, work, c, c_k):
     law_values(model, work, c)
     total = 0.0
     for j in range(laws.row0[i], laws.row0[i + 1]):
-        g[k] = c_k * (w[k] - laws.factor[j] * out[laws.source[j]])
+        g[k] = c_k * (w[k] - laws.factor[j] * work.laws.outputs[laws.source[j]])
         total += g[k]
         k += 1
-    o, s = 6 * laws.head[i, 0], laws.state0[i]
-    for _ in range(laws.head[i, 2]):
-        state_rows(work, s, k, out[o], c_k)
+    found = law_results(laws.head[i], work.laws.outputs)
+    for s in range(found.rates.shape[0]):
+        state_rows(work, laws.state0[i] + s, k, found.rates[s], c_k)
         total += g[k + 1]
-        o, s, k = o + 1, s + 1, k + 3
-    for _ in range(laws.head[i, 3]):
-        g[k] = out[o] * (c_k if model.rows.holds[k] == NOTHING else 1.0)
+        k += 3
+    for j in range(found.equations.shape[0]):
+        g[k] = found.equations[j] * (c_k if model.rows.holds[k] == NOTHING else 1.0)
         total += g[k]
-        o, k = o + 1, k + 1
+        k += 1
     if not math.isfinite(total):
         note_what_is_no_number(model, work, c)
 
@@ -206,9 +265,8 @@ class ByUnknowns(NamedTuple):
 def output_slopes(head, slopes, o):
     """Return the derivatives of output o from those of all outputs of a law."""
     n, columns, n_z, n_lam = head[0], head[1] - 6, head[2], head[3]
-    size = columns * n + n_z + n_lam
-    own = slopes[o * size : (o + 1) * size]
     end = columns * n
+    own = matrix_at(slopes, 0, n_results(head), end + n_z + n_lam)[o]
     return Slopes(own[:end].reshape((n, columns)), own[end : end + n_z], own[end + n_z :])
 
 
@@ -302,38 +360,38 @@ def rates_by_steps(model, work, c, h, rate, bias):
     """Write the differences of `law_rates` with step h; return their deviation from fourth-order differences [g/s²]."""
     i, a, w0 = model.connections.item[c], model.connections.a[c], model.connections.w0[c]
     size = model.connections.size[c]
-    laws, fourth = model.laws, work.laws.slopes  # space that is free here; the derivatives overwrite it
-    n, n_z, n_lam = laws.head[i, 0], laws.head[i, 2], laws.head[i, 3]
+    head = model.laws.head[i]
+    n_z, n_lam = head[2], head[3]
+    fourth = matrix_at(work.laws.slopes, 0, n_lam, 2)  # space that is free here; the derivatives overwrite it
     for j in range(n_lam):
         rate[w0 + size - n_lam + j], bias[w0 + size - n_lam + j] = 0.0, 0.0
-        fourth[2 * j], fourth[2 * j + 1] = 0.0, 0.0
+        fourth[j, 0], fourth[j, 1] = 0.0, 0.0
     law_values(model, work, c)
-    first_state = 1 + n * laws.head[i, 1]
+    here, trial = law_results(head, work.laws.outputs), law_results(head, work.laws.trial)
+    unknowns = unknown_inputs(head, work.laws.inputs)
     for p in range(7):
         e = (p - 3) * h
         law_inputs(model, work, c)
-        x = work.laws.inputs
-        x[0] += e
-        for m in range(a, a + n):
-            o, b = 1 + (m - a) * laws.head[i, 1], work.markers.bias[m]
+        work.laws.inputs[0] += e
+        for k in range(head[0]):
+            m, x = a + k, motion_inputs(head, work.laws.inputs, k)
+            b = work.markers.bias[m]
             v, omega = vector(work.markers.v[m]), vector(work.markers.omega[m])
-            put_sum(x, o, add(scaled(e, v), scaled(0.5 * e * e, vector(b))))
+            put_sum(x.r, 0, add(scaled(e, v), scaled(0.5 * e * e, vector(b))))
             turn = exp_matrix(add(scaled(e, omega), scaled(0.5 * e * e, vector(b[3:]))))
-            A = product(turn, matrix(work.markers.A[m]))
-            for r in range(3):
-                put(x, o + 3 + 3 * r, A[r])
-            put_sum(x, o + 12, scaled(e, vector(b)))
-            put_sum(x, o + 15, scaled(e, vector(b[3:])))
+            put_matrix(x.A, product(turn, matrix(work.markers.A[m])))
+            put_sum(x.v, 0, scaled(e, vector(b)))
+            put_sum(x.omega, 0, scaled(e, vector(b[3:])))
         for s in range(n_z):
-            x[first_state + s] += e * work.laws.outputs[6 * n + s]
+            unknowns.states[s] += e * here.rates[s]
         law_call(model, work, i, work.laws.trial)
         for j in range(n_lam):
-            k, value = w0 + size - n_lam + j, work.laws.trial[6 * n + n_z + j]
-            fourth[2 * j] += FOURTH_FIRST[p] * value / h
+            k, value = w0 + size - n_lam + j, trial.equations[j]
+            fourth[j, 0] += FOURTH_FIRST[p] * value / h
             if model.rows.holds[k] == POSITION:
                 rate[k] += FIRST[p] * value / h
                 bias[k] += SECOND[p] * value / (h * h)
-                fourth[2 * j + 1] += FOURTH_SECOND[p] * value / (h * h)
+                fourth[j, 1] += FOURTH_SECOND[p] * value / (h * h)
             elif model.rows.holds[k] == VELOCITY:
                 bias[k] += FIRST[p] * value / h
                 if p == 3:
@@ -342,9 +400,9 @@ def rates_by_steps(model, work, c, h, rate, bias):
     for j in range(n_lam):
         k = w0 + size - n_lam + j
         if model.rows.holds[k] == POSITION:
-            error = max(error, abs(fourth[2 * j] - rate[k]) / h, abs(fourth[2 * j + 1] - bias[k]))
+            error = max(error, abs(fourth[j, 0] - rate[k]) / h, abs(fourth[j, 1] - bias[k]))
         elif model.rows.holds[k] == VELOCITY:
-            error = max(error, abs(fourth[2 * j] - bias[k]))
+            error = max(error, abs(fourth[j, 0] - bias[k]))
     return error
 
 
@@ -378,11 +436,11 @@ def law_power(model, work, c):
         return 0.0, power_on_bodies(model, work, c), 0.0
     law_values(model, work, c)
     note_stops(model, work, i)
-    seen = n_results(laws.head[i])
-    P_given = work.laws.outputs[seen + given] if given >= 0 else 0.0
-    P_lost = work.laws.outputs[seen + lost] if lost >= 0 else 0.0
+    seen = law_results(laws.head[i], work.laws.outputs).outputs
+    P_given = seen[given] if given >= 0 else 0.0
+    P_lost = seen[lost] if lost >= 0 else 0.0
     if energy >= 0:
-        return work.laws.outputs[seen + energy], P_given, P_lost
+        return seen[energy], P_given, P_lost
     on_bodies = power_on_bodies(model, work, c)
     if given < 0:
         return 0.0, on_bodies + P_lost, P_lost

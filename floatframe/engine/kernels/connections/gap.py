@@ -20,7 +20,7 @@ import math
 from floatframe.engine.kernels.body import modal_number, moved_inertia
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.contact import contact_gap
-from floatframe.engine.kernels.connections.element_law import law_values, n_results
+from floatframe.engine.kernels.connections.element_law import law_results, law_values
 from floatframe.engine.kernels.joints.relative_motion import distance, relative_velocity
 from floatframe.engine.kernels.marker import marker_acceleration, marker_motion, shape, shapes_of
 from floatframe.engine.kernels.model import ELEMENT, MASS, STIFFNESS
@@ -70,7 +70,7 @@ def gap_of_markers(model, work, g):
     i = model.connections.item[c]
     if model.connections.law[c] == ELEMENT:
         law_values(model, work, c)
-        return work.laws.outputs[n_results(model.laws.head[i]) + model.gaps.output[g]]
+        return law_results(model.laws.head[i], work.laws.outputs).outputs[model.gaps.output[g]]
     return contact_gap(model, work.markers.r, work.markers.A, c)
 
 

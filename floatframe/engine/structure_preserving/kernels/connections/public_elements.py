@@ -36,9 +36,11 @@ from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.element_law import (
     FIRST,
     law_call,
-    n_results,
+    law_results,
+    motion_inputs,
     note_stops,
     note_what_is_no_number,
+    unknown_inputs,
 )
 from floatframe.engine.kernels.rotation import exp_matrix
 from floatframe.engine.kernels.vector import (
@@ -111,11 +113,11 @@ def put_inputs(model, work, discrete, step, c, t, where, s, part):
 
     part: fraction of the changes of its states.
     """
-    i, a, x = model.connections.item[c], model.connections.a[c], work.laws.inputs
-    n, width = model.laws.head[i, 0], model.laws.head[i, 1]
-    x[0] = t
-    for m in range(a, a + n):
-        o = 1 + (m - a) * width
+    i, a = model.connections.item[c], model.connections.a[c]
+    head = model.laws.head[i]
+    work.laws.inputs[0] = t
+    for k in range(head[0]):
+        m, x = a + k, motion_inputs(head, work.laws.inputs, k)
         turn = vector(step.turn[m])
         if where == ALONG:
             A = matrix(step.A_law[m]) if s == 0.0 else product(exp_matrix(scaled(s, turn)), matrix(step.A_law[m]))
@@ -124,18 +126,16 @@ def put_inputs(model, work, discrete, step, c, t, where, s, part):
             r, A = vector(step.x_0[m]), matrix(step.A_0[m])
         else:
             r, A = vector(step.end.markers.r[m]), matrix(step.end.markers.A[m])
-        put(x, o, r)
-        for k in range(3):
-            put(x, o + 3 + 3 * k, A[k])
-        put(x, o + 12, scaled(1.0 / step.h, vector(step.d_law[m])))
-        put(x, o + 15, scaled(1.0 / step.h, turn))
-    o = 1 + n * width
+        put(x.r, 0, r)
+        put_matrix(x.A, A)
+        put(x.v, 0, scaled(1.0 / step.h, vector(step.d_law[m])))
+        put(x.omega, 0, scaled(1.0 / step.h, turn))
+    own = unknown_inputs(head, work.laws.inputs)
     change0 = step.load.shape[0] + step.f.shape[0] + model.laws.state0[i]
-    for k in range(model.laws.head[i, 2]):
-        x[o + k] = step.known[model.states.row[model.laws.state0[i] + k]] + part * step.z[change0 + k]
-    o += model.laws.head[i, 2]
-    for j in range(model.laws.head[i, 3]):
-        x[o + j] = step.f[discrete.first[c] + j]
+    for s in range(head[2]):
+        own.states[s] = step.known[model.states.row[model.laws.state0[i] + s]] + part * step.z[change0 + s]
+    for j in range(head[3]):
+        own.multipliers[j] = step.f[discrete.first[c] + j]
 
 
 @inner
@@ -146,7 +146,7 @@ def element_gap(model, work, discrete, step, g):
     begin_motion(model, discrete, step, c)
     put_inputs(model, work, discrete, step, c, step.end.state.time, END, 0.0, 1.0)
     law_call(model, work, i, work.laws.trial)
-    return work.laws.trial[n_results(model.laws.head[i]) + model.gaps.output[g]]
+    return law_results(model.laws.head[i], work.laws.trial).outputs[model.gaps.output[g]]
 
 
 @inner
@@ -159,13 +159,13 @@ def first_row_of_multipliers(model, c):
 def potential(model, discrete, step, c, outputs):
     """Return the declared energy of element c minus the work of its reactions on the constrained positions."""
     i, total = model.connections.item[c], 0.0
-    held = 6 * model.laws.head[i, 0] + model.laws.head[i, 2]
+    found = law_results(model.laws.head[i], outputs)
     if model.laws.energy[i] >= 0:
-        total += outputs[held + model.laws.head[i, 3] + model.laws.energy[i]]
+        total += found.outputs[model.laws.energy[i]]
     row = first_row_of_multipliers(model, c)
     for j in range(model.laws.head[i, 3]):
         if model.rows.holds[row + j] == POSITION:
-            total -= step.f[discrete.first[c] + j] * outputs[held + j]
+            total -= step.f[discrete.first[c] + j] * found.equations[j]
     return total
 
 
@@ -179,13 +179,14 @@ def has_potential(model, c):
 
 
 @inner
-def is_balanced(n, width, x, outputs):
-    """Whether the wrenches of n markers are in equilibrium at the marker positions in the inputs x."""
+def is_balanced(head, inputs, outputs):
+    """Whether the wrenches that a law gives are in equilibrium at the marker positions in its inputs."""
+    found = law_results(head, outputs)
     force, moment, of_forces, of_moments = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, 0.0
-    r_0 = vector(x[1:])
-    for m in range(n):
-        F, M = vector(outputs[6 * m :]), vector(outputs[6 * m + 3 :])
-        arm = sub(vector(x[1 + m * width :]), r_0)
+    r_0 = vector(motion_inputs(head, inputs, 0).r)
+    for m in range(head[0]):
+        F, M = vector(found.wrench[m]), vector(found.wrench[m, 3:])
+        arm = sub(vector(motion_inputs(head, inputs, m).r), r_0)
         force, moment = add(force, F), add(moment, add(cross(arm, F), M))
         of_forces += norm(F)
         of_moments += norm(arm) * norm(F) + norm(M)
@@ -198,7 +199,7 @@ def potential_at(model, work, discrete, step, c, where, s):
     i = model.connections.item[c]
     put_inputs(model, work, discrete, step, c, step.t_force, where, s, 0.5)
     law_call(model, work, i, work.laws.trial)
-    balances = is_balanced(model.laws.head[i, 0], model.laws.head[i, 1], work.laws.inputs, work.laws.trial)
+    balances = is_balanced(model.laws.head[i], work.laws.inputs, work.laws.trial)
     return potential(model, discrete, step, c, work.laws.trial), balances
 
 
@@ -328,14 +329,15 @@ def note(model, work, c):
 def element_load(model, work, discrete, step, c):
     """Add the loads of element c; return supplied and dissipated work."""
     i, a = model.connections.item[c], model.connections.a[c]
-    head, laws, out = model.laws.head[i], model.laws, work.laws.outputs
+    head, laws = model.laws.head[i], model.laws
+    found = law_results(head, work.laws.outputs)
     begin_motion(model, discrete, step, c)
     put_inputs(model, work, discrete, step, c, step.t_force, ALONG, 0.0, 0.0 if step.is_still else 0.5)
-    law_call(model, work, i, out)
+    law_call(model, work, i, work.laws.outputs)
     note(model, work, c)
     for m in range(head[0]):
         for k in range(6):
-            step.wrench[a + m, k] = out[6 * m + k]
+            step.wrench[a + m, k] = found.wrench[m, k]
     if not step.is_still and has_potential(model, c):
         correct_wrenches(model, work, discrete, step, c)
     on_bodies = 0.0
@@ -347,9 +349,8 @@ def element_load(model, work, discrete, step, c):
         if model.markers.moment[m] >= 0:
             add_axes_moment(model, discrete, step, m, M)
             on_bodies += dot(M, vector(step.turn[m]))
-    seen = n_results(head)
-    given = step.h * out[seen + laws.given[i]] if laws.given[i] >= 0 else 0.0
-    lost = step.h * out[seen + laws.lost[i]] if laws.lost[i] >= 0 else 0.0
+    given = step.h * found.outputs[laws.given[i]] if laws.given[i] >= 0 else 0.0
+    lost = step.h * found.outputs[laws.lost[i]] if laws.lost[i] >= 0 else 0.0
     if laws.energy[i] < 0:
         if laws.given[i] < 0:
             given = on_bodies + lost
@@ -374,25 +375,25 @@ def element_residual(model, work, discrete, step, c):
         return
     if head[2] + head[3] == 0:
         return
-    out, row, first = work.laws.trial, first_row_of_multipliers(model, c), n_u + discrete.first[c]
+    found, row, first = law_results(head, work.laws.trial), first_row_of_multipliers(model, c), n_u + discrete.first[c]
     begin_in_middle(model, discrete, step, c)
     put_inputs(model, work, discrete, step, c, 0.5 * (step.t_0 + step.end.state.time), ALONG, 0.0, 0.5)
-    law_call(model, work, i, out)
+    law_call(model, work, i, work.laws.trial)
     for s in range(head[2]):
-        step.residual[state0 + s] = step.z[state0 + s] - h * out[6 * head[0] + s]
+        step.residual[state0 + s] = step.z[state0 + s] - h * found.rates[s]
     holds_position = False
     for j in range(head[3]):
         holds = model.rows.holds[row + j]
         holds_position = holds_position or holds == POSITION
         if holds != POSITION:
-            step.residual[first + j] = (h if holds == VELOCITY else 1.0) * out[6 * head[0] + head[2] + j]
+            step.residual[first + j] = (h if holds == VELOCITY else 1.0) * found.equations[j]
     if not holds_position:
         return
     put_inputs(model, work, discrete, step, c, step.end.state.time, END, 0.0, 1.0)
-    law_call(model, work, i, out)
+    law_call(model, work, i, work.laws.trial)
     for j in range(head[3]):
         if model.rows.holds[row + j] == POSITION:
-            step.residual[first + j] = out[6 * head[0] + head[2] + j]
+            step.residual[first + j] = found.equations[j]
 
 
 @inner
