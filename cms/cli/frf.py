@@ -16,6 +16,7 @@ from cms.assessment.quality.reference.port_model import (
     frf,
     modal_response,
     resonances,
+    response_unit,
 )
 from cms.body.reduced_body import ReducedBody
 from cms.cli.console import print_table, say
@@ -148,13 +149,14 @@ def print_peaks(
     """Print the largest peaks of each component, and their errors relative to the full model."""
     from cms.assessment.quality.of_reduction.frf import peaks
 
-    unit = response_unit
     rows = []
     for motion, force in pairs:
-        magnitude = np.abs(plotted_response(own, request.is_inertance)[:, motion, force])
+        magnitude = np.abs(own.values(is_inertance=request.is_inertance)[:, motion, force])
         found = peaks(own.frequencies, magnitude)[:6]
         where = ", ".join(f"{f:.5g}" for f in sorted(f for f, _ in found)) or "none in the band"
-        rows.append((pair_words(motion, force), where, f"{magnitude.max():.4g}", unit(reduced, motion, force, request)))
+        rows.append(
+            (pair_words(motion, force), where, f"{magnitude.max():.4g}", unit_of(reduced, motion, force, request))
+        )
     print_table(
         f"{reduced.name}: {request.excited} to {request.answering}, {own.damping}",
         ("motion/force", "peaks [Hz]", "largest>", "unit"),
@@ -171,24 +173,16 @@ def print_peaks(
         )
 
 
-def plotted_response(response: FrequencyResponse, is_inertance: bool) -> np.ndarray:
-    """Return inertance or receptance, (n_f, 6, 6)."""
-    return response.inertance if is_inertance else response.H
-
-
 def pair_words(motion: int, force: int) -> str:
     """Return the names of motion and force, such as 'uz/fz', 'rz/mz', 'ux/my'."""
     names = ("fx", "fy", "fz", "mx", "my", "mz")
     return f"{MOTION_COMPONENTS[motion]}/{names[force]}"
 
 
-def response_unit(reduced: ReducedBody, motion: int, force: int, request: FrfRequest) -> str:
+def unit_of(reduced: ReducedBody, motion: int, force: int, request: FrfRequest) -> str:
     """Return the unit of one component."""
-    units = reduced.units
-    top = units.length_symbol if motion < 3 else "rad"
-    top += f"/{units.time_symbol}²" if request.is_inertance else ""
-    bottom = units.force_symbol if force < 3 else f"({units.force_symbol} {units.length_symbol})"
-    return f"{top}/{bottom}"
+    names = MOTION_COMPONENTS[motion], MOTION_COMPONENTS[force]
+    return response_unit(reduced.units, *names, is_inertance=request.is_inertance)
 
 
 def response_table(
@@ -205,8 +199,8 @@ def response_table(
             continue
         for motion, force in pairs:
             name = f"{source} {pair_words(motion, force)}"
-            columns[name] = plotted_response(response, request.is_inertance)[:, motion, force]
-            units[name] = response_unit(reduced, motion, force, request)
+            columns[name] = response.values(is_inertance=request.is_inertance)[:, motion, force]
+            units[name] = unit_of(reduced, motion, force, request)
     return Table(columns, units)
 
 
@@ -221,7 +215,7 @@ def response_figure(
     from cms.assessment.quality.plots import frf_figure
 
     curves = {"reduced": own} if full is None else {"full model": full, "reduced": own}
-    units = [response_unit(reduced, motion, force, request) for motion, force in pairs]
+    units = [unit_of(reduced, motion, force, request) for motion, force in pairs]
     return frf_figure(
         curves,
         [(motion, force) for motion, force in pairs],

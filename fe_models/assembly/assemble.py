@@ -25,7 +25,6 @@ from fe_models.assembly.tables.attachments import (
 from fe_models.assembly.tables.beams import PLANES, beam_properties, rod_properties
 from fe_models.assembly.tables.materials import solid_properties
 from fe_models.assembly.tables.places import (
-    SELECTIONS,
     InterfaceSection,
     interfaces_of,
     load_case_of,
@@ -496,8 +495,7 @@ def _mean_interface(name: str, table: InterfaceSection, coupling: str, model: FE
 def _interface(name: str, table: InterfaceSection, raw: RawMesh, joined: Joined) -> Interface:
     """Return an interface on a group of nodes of the mesh."""
     if not isinstance(table.nodes, str):
-        (given,) = (key for key in SELECTIONS if getattr(table, key) is not None)
-        raise BodyError(f"interfaces.{name}: with a deck, expected nodes = a group of nodes, got {given}")
+        raise BodyError(f"interfaces.{name}: with a deck, expected nodes = a group of nodes, got {table.selection}")
     nodes = _placed(joined, nodes_at(raw, f"interfaces.{name}.nodes", table.nodes), f"interfaces.{name}")
     points = joined.body.nodes[nodes]
     reference = points.mean(axis=0) if table.reference is None else np.array(table.reference)

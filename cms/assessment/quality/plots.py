@@ -40,7 +40,7 @@ def plot_frf(
     """
     ax = ax or new_axes()
     for k, (name, response) in enumerate(curves.items()):
-        values = response.inertance if is_inertance else response.H
+        values = response.values(is_inertance=is_inertance)
         ax.loglog(response.frequencies, np.abs(values[:, output, input]), label=name, **style(k))
     first = next(iter(curves.values()))
     ax.set_ylabel(f"|{first.outputs[output]} / {first.inputs[input]}|")
@@ -59,7 +59,7 @@ def plot_phase(
     """Plot the phase of one entry of frequency responses in degrees; parameters as in `plot_frf`."""
     ax = ax or new_axes()
     for k, (name, response) in enumerate(curves.items()):
-        values = response.inertance if is_inertance else response.H
+        values = response.values(is_inertance=is_inertance)
         ax.semilogx(response.frequencies, np.degrees(np.angle(values[:, output, input])), label=name, **style(k))
     ax.set_yticks([-180, -90, 0, 90, 180])
     ax.set_ylabel("phase [deg]")

@@ -77,18 +77,29 @@ class NearestSection(Table):
     point: Vector3 = Field(description="a point, [x, y, z]")
 
 
-class InterfaceSection(Table):
-    """[interfaces.NAME]: a place at which neighbours connect to the body."""
+class SelectedPlace(Table):
+    """A table with keys that select nodes."""
 
-    kind: choice("kind", lambda: INTERFACE_KINDS) = Field(  # type: ignore[valid-type]
-        description=f"one of {', '.join(INTERFACE_KINDS)}"
-    )
+    kind: Any
     faces: Names | None = Field(None, description=FACES)
     nodes: Nodes | None = Field(None, description="the name of a group of nodes, or a list of node numbers")
     plane: PlaneSection | None = Field(None, description="a table {point, normal, tolerance}")
     cylinder: CylinderSection | None = Field(None, description="a table {point, axis, radius, span, tolerance}")
     box: BoxSection | None = Field(None, description="a table {lo, hi}")
     nearest: NearestSection | None = Field(None, description="a table {point}")
+
+    @property
+    def selection(self) -> str | None:
+        """Key of the given selection; None if there is none."""
+        return next((key for key in SELECTIONS if getattr(self, key) is not None), None)
+
+
+class InterfaceSection(SelectedPlace):
+    """[interfaces.NAME]: a place at which neighbours connect to the body."""
+
+    kind: choice("kind", lambda: INTERFACE_KINDS) = Field(  # type: ignore[valid-type]
+        description=f"one of {', '.join(INTERFACE_KINDS)}"
+    )
     reference: Vector3 | None = Field(None, description="the reference point, [x, y, z]")
     triad: Matrix3 | None = Field(None, description="the axes of the interface, [x axis, y axis, z axis]")
     on: choice("part", lambda: ("solid", "lines")) | None = Field(  # type: ignore[valid-type]
@@ -103,7 +114,7 @@ class InterfaceSection(Table):
         return self
 
 
-class LoadCaseSection(Table):
+class LoadCaseSection(SelectedPlace):
     """[load_cases.NAME]: a named load, whose modal forces and stresses go into the modal file."""
 
     kind: choice("kind", lambda: LOAD_CASE_KINDS) = Field(  # type: ignore[valid-type]
@@ -118,17 +129,6 @@ class LoadCaseSection(Table):
         None, description="with a deck: a table {group = [force and moment at each of its nodes]}"
     )
     reference: Vector3 | None = Field(None, description="the point the force acts at, [x, y, z]")
-    faces: Names | None = Field(None, description=FACES)
-    nodes: Nodes | None = Field(None, description="the name of a group of nodes, or a list of node numbers")
-    plane: PlaneSection | None = Field(None, description="a table {point, normal, tolerance}")
-    cylinder: CylinderSection | None = Field(None, description="a table {point, axis, radius, span, tolerance}")
-    box: BoxSection | None = Field(None, description="a table {lo, hi}")
-    nearest: NearestSection | None = Field(None, description="a table {point}")
-
-    @property
-    def selection(self) -> str | None:
-        """Key of the given selection; None if there is none."""
-        return next((key for key in SELECTIONS if getattr(self, key) is not None), None)
 
     @model_validator(mode="after")
     def _keys_of_the_kind(self) -> "LoadCaseSection":
@@ -196,7 +196,7 @@ def interfaces_of(tables: Mapping[str, InterfaceSection], mesh: "AnyMesh") -> tu
     return tuple(made)
 
 
-def selection_of(section: Any) -> Any:
+def selection_of(section: SelectedPlace) -> Any:
     """Return the node selection of a table, given by one of the keys `SELECTIONS`."""
     from fe_models.meshes import selections
 
@@ -208,7 +208,7 @@ def selection_of(section: Any) -> Any:
         "box": selections.Box,
         "nearest": selections.NearestNode,
     }
-    key = next(key for key in SELECTIONS if getattr(section, key, None) is not None)
+    key = next(key for key in SELECTIONS if getattr(section, key) is not None)
     given = getattr(section, key)
     if key == "faces":
         first, *more = given

@@ -38,7 +38,8 @@ def laboratory_document(result: LaboratoryResult) -> Document:
 
 def convergence_section(made: list[CaseResult]) -> Section:
     """Return charts of the error over coordinates and over processor time, one line for each description."""
-    over_coordinates, over_time = [], []
+    over_coordinates: list[Line] = []
+    over_time: list[Line] = []
     for k, family in enumerate(dict.fromkeys(row.case.family for row in made)):
         rows = sorted((row for row in made if row.case.family == family), key=lambda row: row.n_q)
         error, style, name = np.maximum([row.error for row in rows], FLOOR), style_of(k), rows[0].case.description

@@ -40,7 +40,7 @@ def loads_on_interfaces(system: System, body: int) -> tuple[list[Wrench], list[L
     forces = [force for force in system.forces if isinstance(force, PointForce)]
     load_of = {int(m): k for k, m in enumerate(model.loads.marker)}
     wrenches, loads = [], []
-    for m in np.flatnonzero((model.markers.body == body) & (model.markers.psi0 >= 0)):
+    for m in np.flatnonzero((model.markers.body == body) & (model.markers.psi0 >= 0)).tolist():
         shapes = marker_shapes(model, model.markers.psi, m)
         interface = interface_number(reduced, shapes, model.markers.position[m])
         if interface < 0:  # not at an interface: marker of a sliding joint on its line

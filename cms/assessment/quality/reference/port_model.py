@@ -16,6 +16,7 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = [
     "FrequencyResponse", "PortModel", "file_resonances", "frf", "modal_response", "port_model", "resonances",
+    "response_unit",
 ]  # fmt: skip
 
 CHUNK = 2**22  #: number of complex entries of the equation systems that are solved together
@@ -86,6 +87,10 @@ class FrequencyResponse(Tabular):
             self.units,
         )
 
+    def values(self, *, is_inertance: bool) -> Array:
+        """Return the inertance or the receptance, (n_f, n_out, n_in)."""
+        return self.inertance if is_inertance else self.H
+
     def to_table(self) -> Table:
         """Return the frequency, and the complex receptance of every motion and force: "right uy / left uy"."""
         columns: dict[str, np.ndarray] = {"frequency": self.frequencies}
@@ -94,13 +99,14 @@ class FrequencyResponse(Tabular):
             for i, given in enumerate(self.inputs):
                 columns[f"{output} / {given}"] = self.H[:, o, i]
                 if self.units is not None:
-                    units[f"{output} / {given}"] = receptance_unit(self.units, output, given)
+                    units[f"{output} / {given}"] = response_unit(self.units, output, given)
         return Table(columns, units)
 
 
-def receptance_unit(units: Units, motion: str, force: str) -> str:
+def response_unit(units: Units, motion: str, force: str, *, is_inertance: bool = False) -> str:
     """Return the unit of a motion such as "right uy" per force or moment such as "left ry"."""
     top = units.length_symbol if motion.rsplit(" ", 1)[-1] in MOTION_COMPONENTS[:3] else "rad"
+    top += f"/{units.time_symbol}²" if is_inertance else ""
     is_force = force.rsplit(" ", 1)[-1] in MOTION_COMPONENTS[:3]
     return f"{top}/{units.force_symbol}" if is_force else f"{top}/({units.force_symbol} {units.length_symbol})"
 
