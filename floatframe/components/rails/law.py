@@ -13,6 +13,8 @@ For each wheel, with side = +1 on the left and -1 on the right, and outward = si
     the axle is a state, I Omega' = M·a, and the body receives the remaining moment minus omega × I Omega a
 """
 
+from typing import NamedTuple
+
 import numba
 import numpy as np
 
@@ -23,6 +25,8 @@ __all__ = [
     "HEAD",
     "WHEEL_HEAD",
     "WHEEL_OUTPUTS",
+    "Creepage",
+    "Patch",
     "creep_force",
     "fastsim",
     "fastsim_of_flexibilities",
@@ -267,23 +271,9 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, outputs):
             xi = (ux * c + uy * sn) / V
             eta = (ux * ex + uy * ey + uz * ez) / V
             spin = (ox_ * mx + oy_ * my + oz_ * mz) / V
-            fx, fy, moment = creep_force(
-                law,
-                ahead * xi,
-                ahead * eta,
-                spin,
-                N,
-                a,
-                b,
-                np.exp(field[9]),
-                np.exp(field[10]),
-                np.exp(field[11]),
-                np.exp(field[12]),
-                G,
-                mu,
-                options,
-                V,
-            )
+            c11, c22, c23, c33 = np.exp(field[9]), np.exp(field[10]), np.exp(field[11]), np.exp(field[12])
+            creepage, patch = Creepage(ahead * xi, ahead * eta, spin), Patch(N, a, b, c11, c22, c23, c33, G, mu)
+            fx, fy, moment = creep_force(law, creepage, patch, options, V)
             fx, fy = ahead * fx, ahead * fy
             # component of the normal force along the rail due to irregularities
             up = N * cos
@@ -341,33 +331,54 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, outputs):
 
 
 # creep forces of an elliptic contact: linear, linear with saturation, Polach, FASTSIM ---------------------------------
-# Each is a function law(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options) -> (F_x, F_y, M) on the wheel. xi
-# and eta are longitudinal and lateral creepage, the velocity of the wheel surface relative to the rail divided by the
-# rolling speed; phi the spin [rad/m]; N the normal force [N]; a (rolling direction) and b the semi-axes [m]; then
-# Kalker's coefficients; G [Pa]; mu the friction coefficient; `options` further parameters of a law. x points in the
-# rolling direction, z away from the rail. Numbers may be float64 or complex128 (a step along the imaginary axis gives
-# derivatives); comparisons use real parts.
+# Each is a function law(creepage, patch, options) -> (F_x, F_y, M) on the wheel; `options` are further parameters of a
+# law. x points in the rolling direction, z away from the rail. Numbers may be float64 or complex128 (a step along the
+# imaginary axis gives derivatives); comparisons use real parts.
+
+
+class Creepage(NamedTuple):
+    """Velocity of the wheel surface relative to the rail, divided by the rolling speed."""
+
+    xi: complex  #: longitudinal
+    eta: complex  #: lateral
+    phi: complex  #: spin [rad/m]
+
+
+class Patch(NamedTuple):
+    """An elliptic contact."""
+
+    N: complex  #: normal force [N]
+    a: complex  #: semi-axis in the rolling direction [m]
+    b: complex  #: the other semi-axis [m]
+    c11: complex  #: Kalker's coefficients
+    c22: complex
+    c23: complex
+    c33: complex
+    G: float  #: shear modulus [Pa]
+    mu: float  #: friction coefficient
 
 
 SMALL = 1e-8  #: creepage below which the direction in Polach's law is smoothed
 
 
 @numba.njit(cache=True)
-def linear_creep(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options):
+def linear_creep(creepage, patch, options):
     """Return Kalker's linear forces, without a friction limit."""
-    c2 = a * b
+    (xi, eta, phi), G = creepage, patch.G
+    c2 = patch.a * patch.b
     c = np.sqrt(c2)
     return (
-        -c2 * G * c11 * xi,
-        -c2 * G * (c22 * eta + c * c23 * phi),
-        c2 * c * G * (c23 * eta - c * c33 * phi),
+        -c2 * G * patch.c11 * xi,
+        -c2 * G * (patch.c22 * eta + c * patch.c23 * phi),
+        c2 * c * G * (patch.c23 * eta - c * patch.c33 * phi),
     )
 
 
 @numba.njit(cache=True)
-def saturated_creep(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options):
+def saturated_creep(creepage, patch, options):
     """Return the linear forces, with resultant F limited to mu N (e - e²/3 + e³/27), e = F/(mu N) <= 3 (Shen 1983)."""
-    fx, fy, m = linear_creep(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options)
+    fx, fy, m = linear_creep(creepage, patch, options)
+    N, mu = patch.N, patch.mu
     e2 = (fx * fx + fy * fy) / (mu * mu * N * N)
     if e2.real < 1e-20:
         return fx, fy, m
@@ -377,7 +388,7 @@ def saturated_creep(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options):
 
 
 @numba.njit(cache=True)
-def polach(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options, V):
+def polach(creepage, patch, options, V):
     """Return Polach's forces (1999, 2005); options = (k_A, k_S, A, B), V the rolling speed.
 
     (1)  friction falls with the slip speed w = V |creepage|: mu (A + (1 - A) exp(-B w))
@@ -388,6 +399,8 @@ def polach(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options, V):
          K = |e_M| (d³/3 - d²/2 + 1/6) - (1 - d²)^(3/2)/3 < 0,  d = (e_M² - 1)/(e_M² + 1),
          e_M = (8/3) G b sqrt(a b) C23 eta_c/((1 + 6.3 (1 - exp(-a/b))) mu N)
     """
+    xi, eta, phi = creepage
+    N, a, b, c11, c22, c23, _, G, mu = patch
     k_a, k_s, low, fall = options[0], options[1], options[2], options[3]
     eta_c = eta
     turned = eta + phi * a
@@ -414,16 +427,18 @@ def polach(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options, V):
 
 
 @numba.njit(cache=True)
-def fastsim_of_flexibilities(xi, eta, phi, N, a, b, L1, L2, L3, mu, m_x, m_y):
-    """Return the forces of Kalker's simplified theory (1982) with flexibilities L1, L2, L3 [m³/N].
+def fastsim_of_flexibilities(creepage, patch, flexibilities, cells):
+    """Return the forces of Kalker's simplified theory (1982) with flexibilities (L1, L2, L3) [m³/N].
 
-    The surface displacement is L times the local traction. In each of m_y strips, from the leading edge, u = x/a
-    decreases from sqrt(1 - v²), v = y/b:
+    The surface displacement is L times the local traction. Each of m_y strips has m_x cells; cells = (m_x, m_y). From
+    the leading edge of a strip, u = x/a decreases from sqrt(1 - v²), v = y/b:
 
     (1)  dt_x = (xi/L1 - phi b v/L3) a du,  dt_y = (eta/L2 + phi a u/L3) a du  without slip
     (2)  if |t| exceeds the bound mu p, p = 2 N (1 - u² - v²)/(pi a b), it is reduced to the bound
     (3)  force = sum of t over cells of equal width in their strip, with the tractions at their middle
     """
+    (xi, eta, phi), (L1, L2, L3), (m_x, m_y) = creepage, flexibilities, cells
+    N, a, b, mu = patch.N, patch.a, patch.b, patch.mu
     fx = 0 * (xi + N)
     fy = 0 * (xi + N)
     m = 0 * (xi + N)
@@ -463,25 +478,27 @@ def fastsim_of_flexibilities(xi, eta, phi, N, a, b, L1, L2, L3, mu, m_x, m_y):
 
 
 @numba.njit(cache=True)
-def fastsim(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options):
+def fastsim(creepage, patch, options):
     """Return FASTSIM's forces with flexibilities from the linear coefficients; options = (cells along, strips).
 
     L1 = 8 a/(3 G C11), L2 = 8 a/(3 G C22), L3 = pi a sqrt(a/b)/(4 G C23): forces at vanishing creepage are the linear
     ones.
     """
-    L1 = 8 * a / (3 * G * c11)
-    L2 = 8 * a / (3 * G * c22)
-    L3 = np.pi * a * np.sqrt(a / b) / (4 * G * c23)
-    return fastsim_of_flexibilities(xi, eta, phi, N, a, b, L1, L2, L3, mu, int(options[0].real), int(options[1].real))
+    a, G = patch.a, patch.G
+    L1 = 8 * a / (3 * G * patch.c11)
+    L2 = 8 * a / (3 * G * patch.c22)
+    L3 = np.pi * a * np.sqrt(a / patch.b) / (4 * G * patch.c23)
+    cells = int(options[0].real), int(options[1].real)
+    return fastsim_of_flexibilities(creepage, patch, (L1, L2, L3), cells)
 
 
 @numba.njit(cache=True)
-def creep_force(law, xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options, V):
+def creep_force(law, creepage, patch, options, V):
     """Return (F_x, F_y, M) at a rolling speed V, by the law with a number in `CREEP_LAWS`."""
     if law == 0:
-        return linear_creep(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options)
+        return linear_creep(creepage, patch, options)
     if law == 1:
-        return saturated_creep(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options)
+        return saturated_creep(creepage, patch, options)
     if law == 2:
-        return polach(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options, V)
-    return fastsim(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options)
+        return polach(creepage, patch, options, V)
+    return fastsim(creepage, patch, options)

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from floatframe.components import rails
 from floatframe.components.rails.assembly import grid_of, shift_off_the_rail
 from floatframe.components.rails.contact_table import FIELDS, Steel, contact_table
-from floatframe.components.rails.law import HEAD, LIFTED, WHEEL_HEAD, fastsim, polach
+from floatframe.components.rails.law import HEAD, LIFTED, WHEEL_HEAD, Creepage, Patch, fastsim, polach
 from tests.floatframe.element_laws import marker_motion
 from tests.floatframe.laws.form import A, Form, State
 
@@ -65,9 +65,10 @@ def creep_force(laws, *at, V):
     xi, eta, phi, N, a, b, c11, c22, c23, c33 = at
     G, mu = laws.shear_modulus, laws.friction
     if laws.creep == "polach":
-        return polach.py_func(*at, G, mu, laws.polach, V)
+        return polach.py_func(Creepage(xi, eta, phi), Patch(*at[3:], G, mu), laws.polach, V)
     if laws.creep == "fastsim":
-        return fastsim.py_func(*at, G, mu, np.array([laws.strips, laws.strips, 0.0]))
+        options = np.array([laws.strips, laws.strips, 0.0])
+        return fastsim.py_func(Creepage(xi, eta, phi), Patch(*at[3:], G, mu), options)
     c = np.sqrt(a * b)
     F = -c * c * G * np.array([c11 * xi, c22 * eta + c * c23 * phi, -c * c23 * eta + c * c * c33 * phi])
     e = np.hypot(F[0], F[1]) / (mu * N)

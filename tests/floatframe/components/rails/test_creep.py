@@ -6,6 +6,8 @@ from numpy.testing import assert_allclose
 
 from floatframe.components.rails.kalker import asymptotes, kalker_coefficients
 from floatframe.components.rails.law import (
+    Creepage,
+    Patch,
     creep_force,
     fastsim,
     fastsim_of_flexibilities,
@@ -24,7 +26,7 @@ NO_OPTIONS = np.zeros(5)
 def forces(law, xi, eta, phi, options=None, normal=N):
     options = OPTIONS.get(law, NO_OPTIONS) if options is None else options
     speed = (20.0,) if law is polach else ()
-    return np.array(law(xi, eta, phi, normal, A, B, *STEEL, G, MU, options, *speed))
+    return np.array(law(Creepage(xi, eta, phi), Patch(normal, A, B, *STEEL, G, MU), options, *speed))
 
 
 @pytest.mark.parametrize(
@@ -59,8 +61,7 @@ def test_coefficients_go_on_continuously_and_agree_with_his_asymptotes():
 @pytest.mark.parametrize("law", [fastsim, saturated_creep, polach])
 def test_small_creepages_give_linear_forces(law):
     for creepage in ((1e-6, 0, 0), (0, 1e-6, 0), (0, 0, 1e-4)):
-        expected = np.array(linear_creep(*creepage, N, A, B, *STEEL, G, MU, NO_OPTIONS))
-        found = forces(law, *creepage)
+        expected, found = forces(linear_creep, *creepage), forces(law, *creepage)
         tolerance = 3e-3 if law is not fastsim or not creepage[2] else 6e-3
         assert_allclose(found[:2], expected[:2], rtol=tolerance, atol=1e-6 * np.abs(expected).max())
 
@@ -115,7 +116,8 @@ def test_fastsim_converges_to_the_equations_of_simplified_theory():
 
     coarse, fine = square(400), square(800)
     expected = 2 * fine - coarse  # first order in the element
-    found = np.array(fastsim_of_flexibilities(xi, eta, phi, N, A, B, L1, L2, L3, MU, 200, 200))
+    creepage, patch = Creepage(xi, eta, phi), Patch(N, A, B, *STEEL, G, MU)
+    found = np.array(fastsim_of_flexibilities(creepage, patch, (L1, L2, L3), (200, 200)))
     assert_allclose(found[:2], expected[:2], rtol=2e-3)
     assert_allclose(found[2], expected[2], rtol=4e-3)
 
@@ -148,7 +150,7 @@ def test_steps_along_the_imaginary_axis_give_the_derivatives(number):
     at = np.array([7e-4, -4e-4, 0.3, N, A, B])
 
     def law(v):
-        return np.array(creep_force(number, *v, *STEEL, G, MU, options, 20.0))
+        return np.array(creep_force(number, Creepage(*v[:3]), Patch(*v[3:], *STEEL, G, MU), options, 20.0))
 
     for k in range(6):
         step = np.zeros(6)
