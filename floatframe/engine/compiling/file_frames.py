@@ -12,7 +12,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.system import CompiledSystem
 from floatframe.engine.kernels.memory import Rows
-from floatframe.model.bodies.mean_axes import FrameMotion
+from floatframe.model.bodies.mean_axes import FrameMotion, MeanAxes
 from floatframe.model.state import State
 
 __all__ = [
@@ -70,19 +70,21 @@ def changed_state(compiled: CompiledSystem, state: State, u_dot: Array, way: Way
 def changed(compiled: CompiledSystem, arrays: tuple[Array, ...], way: Way) -> tuple[Array, ...]:
     """Return r (..., n_b, 3), p (..., n_b, 4), q (..., n_q), u and u_dot (..., n_u) in the other set of body frames."""
     r, p, q, u, u_dot = (np.array(array) for array in arrays)
+    alike: dict[MeanAxes, list[int]] = {}  # bodies with the same modal file are converted together
+    for i, axes in enumerate(compiled.mean_axes):
+        if axes is not None:
+            alike.setdefault(axes, []).append(i)
     with np.errstate(over="ignore", invalid="ignore"):  # a motion that diverges contains NaN
-        for i, axes in enumerate(compiled.mean_axes):
-            if axes is None:
-                continue
-            own_q = slice(int(compiled.model.bodies.q0[i]), int(compiled.model.bodies.q0[i + 1]))
-            u0, end = int(compiled.model.bodies.u0[i]), int(compiled.model.bodies.u0[i + 1])
-            v, omega, rates = slice(u0, u0 + 3), slice(u0 + 3, u0 + 6), slice(u0 + 6, end)
+        for axes, own in alike.items():
+            modes = np.arange(axes.reduced.n_q)
+            u0, own_q = compiled.model.bodies.u0[own, None], compiled.model.bodies.q0[own, None] + modes
+            v, omega, rates = u0 + np.arange(3), u0 + np.arange(3, 6), u0 + 6 + modes
             motion = FrameMotion(
-                r[..., i, :], p[..., i, :], q[..., own_q], u[..., v], u[..., omega], u[..., rates],
+                r[..., own, :], p[..., own, :], q[..., own_q], u[..., v], u[..., omega], u[..., rates],
                 u_dot[..., v], u_dot[..., omega], u_dot[..., rates],
             )  # fmt: skip
             new = axes.to_file(motion) if way == "to_file" else axes.to_mean(motion)
-            r[..., i, :], p[..., i, :], q[..., own_q] = new.r, new.p, new.q
+            r[..., own, :], p[..., own, :], q[..., own_q] = new.r, new.p, new.q
             u[..., v], u[..., omega], u[..., rates] = new.v, new.omega, new.q_dot
             u_dot[..., v], u_dot[..., omega], u_dot[..., rates] = new.v_dot, new.omega_dot, new.q_ddot
     return r, p, q, u, u_dot
