@@ -15,7 +15,8 @@ def plan_elimination(sizes: list[int], ends_of_bodies: list[list[int]], connecti
     (1) two connections are neighbours if both have an end on the same body;
     (2) the connection with the fewest neighbours is eliminated next, and its neighbours become neighbours of each other
         (minimum degree: no fill for chains and trees);
-    (3) every block of the factors that is not zero gets its position in one flat array.
+    (3) for each connection, one flat array stores the diagonal block, the blocks of its row with all neighbours that
+        are eliminated later as one matrix (upper panel), and the blocks of its column likewise (lower panel).
 
     Parameters
     ----------
@@ -32,58 +33,91 @@ def plan_elimination(sizes: list[int], ends_of_bodies: list[list[int]], connecti
         group = {int(connection_of[m]) for m in ends}
         for j in group:
             neighbours[j] |= group - {j}
-    place: dict[tuple[int, int], int] = {}
+    order, later = least_degrees(neighbours)
+    position = {j: step for step, j in enumerate(order)}
+    diagonal, upper, lower, width = [0] * n, [0] * n, [0] * n, [0] * n
+    first_in_panel: list[dict[int, int]] = [{} for _ in range(n)]  # first column of each later neighbour
     n_store = 0
+    for j in order:
+        later[j].sort(key=position.__getitem__)
+        for i in later[j]:
+            first_in_panel[j][i] = width[j]
+            width[j] += sizes[i]
+        diagonal[j], upper[j] = n_store, n_store + sizes[j] ** 2
+        lower[j] = upper[j] + sizes[j] * width[j]
+        n_store = lower[j] + sizes[j] * width[j]
 
-    def block(i: int, j: int) -> int:
-        nonlocal n_store
-        if (i, j) not in place:
-            place[i, j] = n_store
-            n_store += sizes[i] * sizes[j]
-        return place[i, j]
+    def block(i: int, k: int) -> tuple[int, int]:
+        """Return index and row stride of block (i, k)."""
+        if i == k:
+            return diagonal[i], sizes[i]
+        if position[i] < position[k]:
+            return upper[i] + first_in_panel[i][k], width[i]
+        return lower[k] + first_in_panel[k][i] * sizes[k], sizes[k]
 
-    diagonal = [block(j, j) for j in range(n)]
     pairs = [(a, b) for ends in ends_of_bodies for a in ends for b in ends]
-    pair_block = [block(int(connection_of[a]), int(connection_of[b])) for a, b in pairs]
+    pair_blocks = [block(int(connection_of[a]), int(connection_of[b])) for a, b in pairs]
+    runs = [joined_runs([(*block(i, k), sizes[k]) for k in later[j]]) for j in order for i in later[j]]
+    return filled(
+        Elimination(),
+        order=order,
+        diagonal=diagonal,
+        upper=upper,
+        lower=lower,
+        width=width,
+        n_store=n_store,
+        pair0=first_of([[(a, b) for a in ends for b in ends] for ends in ends_of_bodies]),
+        pair_row=[a for a, _ in pairs],
+        pair_column=[b for _, b in pairs],
+        pair_block=[first for first, _ in pair_blocks],
+        pair_stride=[stride for _, stride in pair_blocks],
+        after0=first_of([later[j] for j in order]),
+        after=[i for j in order for i in later[j]],
+        run0=first_of(runs),
+        run=[first for of_row in runs for first, _, _ in of_row],
+        run_stride=[stride for of_row in runs for _, stride, _ in of_row],
+        run_length=[length for of_row in runs for _, _, length in of_row],
+    )
+
+
+def least_degrees(neighbours: list[set[int]]) -> tuple[list[int], list[list[int]]]:
+    """Return the elimination order of least degree, and for each connection its neighbours that are eliminated later.
+
+    `neighbours` is overwritten.
+    """
     order: list[int] = []
-    after: list[int] = []
-    lower: list[int] = []
-    upper: list[int] = []
-    update: list[int] = []
-    after0, update0 = [0], [0]
-    waiting = [(len(neighbours[j]), j) for j in range(n)]  # an entry is skipped if its number has changed since then
+    later: list[list[int]] = [[] for _ in neighbours]
+    waiting = [(len(others), j) for j, others in enumerate(neighbours)]  # skipped if the number has changed since then
     heapify(waiting)
-    is_left = [True] * n
+    is_left = [True] * len(neighbours)
     while waiting:
         n_neighbours, j = heappop(waiting)
         if not is_left[j] or n_neighbours != len(neighbours[j]):
             continue
         is_left[j] = False
-        later = sorted(neighbours[j])
         order.append(j)
-        for i in later:
+        later[j] = sorted(neighbours[j])
+        for i in later[j]:
             neighbours[i] |= neighbours[j] - {i}
             neighbours[i].discard(j)
             heappush(waiting, (len(neighbours[i]), i))
-            after.append(i)
-            lower.append(block(i, j))
-            upper.append(block(j, i))
-        update.extend(block(i, k) for i in later for k in later)
-        after0.append(len(after))
-        update0.append(len(update))
+    return order, later
 
-    return filled(
-        Elimination(),
-        order=order,
-        diagonal=diagonal,
-        n_store=n_store,
-        pair_row=[a for a, _ in pairs],
-        pair_column=[b for _, b in pairs],
-        pair_block=pair_block,
-        after0=after0,
-        after=after,
-        after_lower=lower,
-        after_upper=upper,
-        update0=update0,
-        update=update,
-    )
+
+def joined_runs(blocks: list[tuple[int, int, int]]) -> list[tuple[int, int, int]]:
+    """Return blocks (index, row stride, number of columns) with those joined that are side by side in one panel."""
+    runs: list[tuple[int, int, int]] = []
+    for first, stride, length in blocks:
+        if runs and runs[-1][:2] == (first - runs[-1][2], stride):
+            runs[-1] = (*runs[-1][:2], runs[-1][2] + length)
+        else:
+            runs.append((first, stride, length))
+    return runs
+
+
+def first_of(lists: list[list]) -> list[int]:
+    """Return the index of the first entry of each list in their concatenation, and its length."""
+    first = [0]
+    for each in lists:
+        first.append(first[-1] + len(each))
+    return first

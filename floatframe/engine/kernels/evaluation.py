@@ -19,7 +19,15 @@ from floatframe.engine.kernels.rotation import right_jacobian, spin_jacobian
 from floatframe.engine.kernels.time_function import time_function
 from floatframe.engine.kernels.vector import put, put_matrix, put_sum, scaled, turned, turned_back, vector
 
-__all__ = ["evaluate", "evaluate_bodies", "evaluate_markers", "linearize", "slide_markers", "tangent_of_body"]
+__all__ = [
+    "evaluate",
+    "evaluate_bodies",
+    "evaluate_markers",
+    "linearize",
+    "linearize_body",
+    "slide_markers",
+    "tangent_of_body",
+]
 
 
 @inner
@@ -118,22 +126,25 @@ def turning_by_unknown(model, work, i):
 @inner
 def linearize(model, work, c_m, c_d, c_k):
     """Write H of every body, J_row and J_column of every end, P and V of every connection, without factorisation."""
-    rate = c_d / c_k if c_k > 0.0 else 0.0
     for i in range(model.bodies.kind.shape[0]):
-        n = 6 + model.bodies.n_q[i]
-        turning = work.bodies.T_right[i]
-        put_matrix(turning, turning_by_unknown(model, work, i))
-        H = newton_block(model, work, i)
-        tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning)
-        for e in range(model.bodies.end0[i], model.bodies.end0[i + 1]):
-            m = model.bodies.ends[e]
-            o = model.markers.x0[m]
-            column = rows_of(work.solver.J_column, 6, o, n)
-            row = rows_of(work.solver.J_row, 12, o, n)
-            marker_columns(model, work, m, rate, turning, column, row)
-            if model.markers.accelerated[m] >= 0:
-                o = model.markers.a0[m]
-                row_a = rows_of(work.solver.J_a, 6, o, n)
-                acceleration_columns(model, work, m, c_m, c_d, c_k, turning, row_a)
+        linearize_body(model, work, i, c_m, c_d, c_k)
     for c in range(model.connections.size.shape[0]):
         connection_derivatives(model, work, c, c_k)
+
+
+@inner
+def linearize_body(model, work, i, c_m, c_d, c_k):
+    """Write H of body i, and J_row and J_column of its ends, without factorisation."""
+    n, rate, turning = 6 + model.bodies.n_q[i], c_d / c_k if c_k > 0.0 else 0.0, work.bodies.T_right[i]
+    put_matrix(turning, turning_by_unknown(model, work, i))
+    tangent_of_body(model, work, i, c_m, c_d, c_k, newton_block(model, work, i), turning)
+    for e in range(model.bodies.end0[i], model.bodies.end0[i + 1]):
+        m = model.bodies.ends[e]
+        o = model.markers.x0[m]
+        column = rows_of(work.solver.J_column, 6, o, n)
+        row = rows_of(work.solver.J_row, 12, o, n)
+        marker_columns(model, work, m, rate, turning, column, row)
+        if model.markers.accelerated[m] >= 0:
+            o = model.markers.a0[m]
+            row_a = rows_of(work.solver.J_a, 6, o, n)
+            acceleration_columns(model, work, m, c_m, c_d, c_k, turning, row_a)

@@ -31,6 +31,7 @@ from floatframe.engine.kernels.schur import (
     factorize_bodies,
     move_bodies,
     renew_connections,
+    renew_turning,
     settle_accelerations,
     share_reactions,
     velocity_gaps,
@@ -545,8 +546,8 @@ def one_step(model, work, memory, order, h):
     holds = order.stabilized != 0 and solver.mu.shape[0] > 0
     mass = total_mass(model)
     least_gap = SAFE * wanted / math.sqrt(mass) if mass > 0.0 else 0.0  # all bodies are within the limit
-    is_new, is_aged, first_of_rates = True, False, 0.0
     has_states = model.states.row.shape[0] + model.laws.equation.shape[0] > 0
+    is_new, is_aged, first_of_rates = not has_states, False, 0.0  # states renew the connections at the next iterate
     for iteration in range(order.max_iterations):
         evaluate(model, work, c_k)
         if iteration == 0 and order.stabilized != 0:
@@ -560,6 +561,11 @@ def one_step(model, work, memory, order, h):
             solver.c_m, solver.c_d, solver.c_k = c_m, c_d, c_k
             work.solver.is_due, solver.n_steps, solver.n_spent, solver.contraction = 0, 0, solver.price, -1.0
             is_new = True
+        elif iteration == 0:
+            body = renew_turning(model, work, c_m, c_d, c_k)
+            if body >= 0:
+                work.solver.is_due = 1
+                return SINGULAR_BODY, body, excess, -1.0
         connection = -1
         if is_new and solver.mu.shape[0] > 0:
             connection = renew_connections(model, work, c_k)

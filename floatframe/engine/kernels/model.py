@@ -337,16 +337,22 @@ class Elimination(NamedTuple):
 
     order: IntArray = integer(n_c)  #: connections in the order of elimination
     diagonal: IntArray = integer(n_c)  #: index of each diagonal block in the array of blocks
+    upper: IntArray = integer(n_c)  #: index of the blocks right of the diagonal block, one matrix with `width` columns
+    lower: IntArray = integer(n_c)  #: index of the blocks below the diagonal block, one matrix with `width` rows
+    width: IntArray = integer(n_c)  #: number of rows of all neighbours that are eliminated later
     n_store: IntArray = integer()  #: length of the array of blocks
-    pair_row: IntArray = integer(n_pairs)  #: for each pair of ends on one body: marker whose connection has the rows
+    pair0: IntArray = integer(n_b + 1)  #: pairs of ends on body i are pair0[i]:pair0[i + 1]
+    pair_row: IntArray = integer(n_pairs)  #: for each pair: marker whose connection has the rows
     pair_column: IntArray = integer(n_pairs)  #: marker whose connection has the wrench
     pair_block: IntArray = integer(n_pairs)  #: index of the block in the array of blocks
+    pair_stride: IntArray = integer(n_pairs)  #: distance of its rows in the array of blocks
     after0: IntArray = integer(n_c + 1)  #: neighbours eliminated later than order[k] are after0[k]:after0[k + 1]
     after: IntArray = integer(Size("neighbours"))  #: neighbour i of each elimination step
-    after_lower: IntArray = integer(Size("neighbours"))  #: index of block (i, j)
-    after_upper: IntArray = integer(Size("neighbours"))  #: index of block (j, i)
-    update0: IntArray = integer(n_c + 1)  #: first of the n² target blocks of step k
-    update: IntArray = integer(Size("updates"))  #: index of block (i, k) for each pair of neighbours
+    #: an elimination changes rows of each of its neighbours: first of the runs of columns that it changes
+    run0: IntArray = integer(Size("neighbours and one"))
+    run: IntArray = integer(Size("runs"))  #: index of each run of columns in the array of blocks
+    run_stride: IntArray = integer(Size("runs"))  #: distance of its rows in the array of blocks
+    run_length: IntArray = integer(Size("runs"))  #: number of its columns
 
 
 class Angles(NamedTuple):

@@ -10,13 +10,14 @@ and Z do not rotate with the body, so that they can be used for many steps; P, R
 import math
 
 from floatframe.engine.kernels.body import modal_number, newton_block
-from floatframe.engine.kernels.compiler.compilation import inner, small, view
+from floatframe.engine.kernels.compiler.compilation import inner, loops, small, view
 from floatframe.engine.kernels.connections.connection import (
     connection_derivatives,
     constraint_rates,
     write_velocity_gaps,
 )
 from floatframe.engine.kernels.dense import (
+    add_products,
     lu_factor,
     lu_solve,
     lu_solve_columns,
@@ -26,7 +27,7 @@ from floatframe.engine.kernels.dense import (
     six_columns,
     subtract_product,
 )
-from floatframe.engine.kernels.evaluation import linearize
+from floatframe.engine.kernels.evaluation import linearize, linearize_body
 from floatframe.engine.kernels.model import STIFFNESS
 from floatframe.engine.kernels.vector import add, copy, dot, put, put_sum, scaled, sub, turned, turned_back, vector
 from floatframe.model.joints.rows.kinds import NOTHING
@@ -40,11 +41,13 @@ __all__ = [
     "factorize_system",
     "move_bodies",
     "renew_connections",
+    "renew_turning",
     "settle_accelerations",
     "share_reactions",
     "velocity_gaps",
 ]
 
+TURNING = 0.02  # rotation in a step [rad] above which the factors of a rigid body are renewed in every step
 SOFTER = 1e3  # s of `share_reactions`: s S is well above the roundoff of A
 SWEEPS = 5  # number of iterations: with soft 1e-9 of A, constraints with a condition number of 1e4 share to 1e-10
 
@@ -61,30 +64,47 @@ def factorize_tangents(model, work):
     """Factorise H of every body and write X and Z; return the body with singular H, or -1."""
     work.counted.factorisations += 1
     for i in range(model.bodies.kind.shape[0]):
-        n = 6 + model.bodies.n_q[i]
-        H = newton_block(model, work, i)
-        if not lu_factor(H, work.solver.pivot[model.bodies.u0[i] : model.bodies.u0[i + 1]]):
+        if not factorize_body(model, work, i):
             return i
-        for e in range(model.bodies.end0[i], model.bodies.end0[i + 1]):
-            o = model.markers.x0[model.bodies.ends[e]]
-            column = rows_of(work.solver.J_column, 6, o, n)
-            X = work.solver.X[o : o + n]
-            for r in range(n):
-                for k in range(6):
-                    X[r, k] = column[k, r]
-            lu_solve_columns(H, work.solver.pivot[model.bodies.u0[i] : model.bodies.u0[i + 1]], X)
-    for p in range(model.elimination.pair_row.shape[0]):
-        row_marker, column_marker = model.elimination.pair_row[p], model.elimination.pair_column[p]
-        n = 6 + model.bodies.n_q[model.markers.body[row_marker]]
-        o = model.markers.x0[row_marker]
-        row = rows_of(work.solver.J_row, 12, o, n)
-        o = model.markers.x0[column_marker]
+    return -1
+
+
+@inner
+def factorize_body(model, work, i):
+    """Factorise H of body i and write X of its ends and Z of its pairs of ends; return whether H is regular."""
+    n, pivot = 6 + model.bodies.n_q[i], work.solver.pivot[model.bodies.u0[i] : model.bodies.u0[i + 1]]
+    H = newton_block(model, work, i)
+    if not lu_factor(H, pivot):
+        return False
+    for e in range(model.bodies.end0[i], model.bodies.end0[i + 1]):
+        o = model.markers.x0[model.bodies.ends[e]]
+        column = rows_of(work.solver.J_column, 6, o, n)
         X = work.solver.X[o : o + n]
-        n_motion = 12 if model.connections.has_rates[model.markers.connection[row_marker]] else 6
-        six_columns(row, X, work.solver.Z[p, :n_motion])
+        for r in range(n):
+            for k in range(6):
+                X[r, k] = column[k, r]
+        lu_solve_columns(H, pivot, X)
+    for p in range(model.elimination.pair0[i], model.elimination.pair0[i + 1]):
+        row_marker, o = model.elimination.pair_row[p], model.markers.x0[model.elimination.pair_column[p]]
+        X, n_motion = (
+            work.solver.X[o : o + n],
+            12 if model.connections.has_rates[model.markers.connection[row_marker]] else 6,
+        )
+        six_columns(rows_of(work.solver.J_row, 12, model.markers.x0[row_marker], n), X, work.solver.Z[p, :n_motion])
         if model.markers.accelerated[row_marker] >= 0:
-            o = model.markers.a0[row_marker]
-            six_columns(rows_of(work.solver.J_a, 6, o, n), X, work.solver.Z_a[p])
+            six_columns(rows_of(work.solver.J_a, 6, model.markers.a0[row_marker], n), X, work.solver.Z_a[p])
+    return True
+
+
+@inner
+def renew_turning(model, work, c_m, c_d, c_k):
+    """Linearise and factorise the rigid bodies that rotate by more than `TURNING` in the step."""
+    for i in range(model.bodies.kind.shape[0]):
+        theta = vector(work.state.theta[i])
+        if model.bodies.n_q[i] == 0 and dot(theta, theta) > TURNING * TURNING:
+            linearize_body(model, work, i, c_m, c_d, c_k)
+            if not factorize_body(model, work, i):
+                return i
     return -1
 
 
@@ -124,17 +144,24 @@ def diagonal_block(elimination, connections, solver, c):
 
 
 @view
-def lower_block(elimination, connections, solver, j, e):
-    """Return block (i, j), where connection i = after[e] is eliminated after j."""
-    rows = connections.size[elimination.after[e]]
-    return matrix_at(solver.blocks, elimination.after_lower[e], rows, connections.size[j])
+def upper_panel(elimination, connections, solver, j):
+    """Return the blocks right of the diagonal block of connection j, without those of earlier eliminations."""
+    return matrix_at(solver.blocks, elimination.upper[j], connections.size[j], elimination.width[j])
 
 
 @view
-def upper_block(elimination, connections, solver, j, e):
-    """Return block (j, i), where connection i = after[e] is eliminated after j."""
-    columns = connections.size[elimination.after[e]]
-    return matrix_at(solver.blocks, elimination.after_upper[e], connections.size[j], columns)
+def lower_panel(elimination, connections, solver, j):
+    """Return the blocks below the diagonal block of connection j, without those of earlier eliminations."""
+    return matrix_at(solver.blocks, elimination.lower[j], elimination.width[j], connections.size[j])
+
+
+@view
+def pair_rows(model, solver, p):
+    """Return the rows of the block of pair p; the block has the first columns."""
+    c = model.markers.connection[model.elimination.pair_row[p]]
+    return matrix_at(
+        solver.blocks, model.elimination.pair_block[p], model.connections.size[c], model.elimination.pair_stride[p]
+    )
 
 
 @inner
@@ -149,10 +176,7 @@ def assemble(model, work, c_k):
                 own[r, k] = work.connections.V[c, r, k]
     for p in range(model.elimination.pair_row.shape[0]):
         a, b = model.elimination.pair_row[p], model.elimination.pair_column[p]
-        c, d = model.markers.connection[a], model.markers.connection[b]
-        own = matrix_at(
-            work.solver.blocks, model.elimination.pair_block[p], model.connections.size[c], model.connections.size[d]
-        )
+        c, own = model.markers.connection[a], pair_rows(model, work.solver, p)
         R, P, Z, sign = (
             work.state.R[model.markers.body[a]],
             work.connections.P[a],
@@ -193,7 +217,7 @@ def add_accelerated(model, work, p, r, own):
             put_sum(own, w_part, scaled(model.markers.sign[b], turned(R, x)))
 
 
-@inner
+@loops
 def factorize_connections(elimination, connections, solver):
     """Factorise the connections in the planned order; return the connection with a singular block, or -1."""
     for step in range(elimination.order.shape[0]):
@@ -201,41 +225,54 @@ def factorize_connections(elimination, connections, solver):
         D, pivot = diagonal_block(elimination, connections, solver, j), wrench_of(connections, solver.block_pivot, j)
         if not lu_factor(D, pivot):
             return j
-        first, last = elimination.after0[step], elimination.after0[step + 1]
-        for e in range(first, last):
-            lu_solve_columns(D, pivot, upper_block(elimination, connections, solver, j, e))
-        target = elimination.update0[step]
-        for e in range(first, last):
-            L = lower_block(elimination, connections, solver, j, e)
-            for f in range(first, last):
-                U = upper_block(elimination, connections, solver, j, f)
-                own = matrix_at(solver.blocks, elimination.update[target], L.shape[0], U.shape[1])
-                target += 1
-                for r in range(own.shape[0]):
-                    for k in range(own.shape[1]):
-                        total = 0.0
-                        for i in range(U.shape[0]):
-                            total += L[r, i] * U[i, k]
-                        own[r, k] -= total
+        upper, lower = (
+            upper_panel(elimination, connections, solver, j),
+            lower_panel(elimination, connections, solver, j),
+        )
+        lu_solve_columns(D, pivot, upper)
+        product, row = solver.panel_row[: upper.shape[1]], 0
+        for e in range(elimination.after0[step], elimination.after0[step + 1]):
+            for r in range(connections.size[elimination.after[e]]):
+                product[:] = 0.0
+                add_products(upper, lower[row], product)
+                subtract_runs(elimination, solver.blocks, e, r, product)
+                row += 1
     return -1
 
 
-@inner
+@loops
+def subtract_runs(elimination, blocks, e, r, product):
+    """Subtract a row of a product of panels from row r of connection after[e]."""
+    column = 0
+    for k in range(elimination.run0[e], elimination.run0[e + 1]):
+        first, length = elimination.run[k] + r * elimination.run_stride[k], elimination.run_length[k]
+        for c in range(length):
+            blocks[first + c] -= product[column + c]
+        column += length
+
+
+@loops
 def solve_connections(elimination, connections, solver):
     """Overwrite mu, which contains the right side, with the solution."""
     for step in range(elimination.order.shape[0]):
         j = elimination.order[step]
-        D, own = diagonal_block(elimination, connections, solver, j), wrench_of(connections, solver.mu, j)
-        lu_solve(D, wrench_of(connections, solver.block_pivot, j), own)
+        own, lower = wrench_of(connections, solver.mu, j), lower_panel(elimination, connections, solver, j)
+        lu_solve(
+            diagonal_block(elimination, connections, solver, j), wrench_of(connections, solver.block_pivot, j), own
+        )
+        row = 0
         for e in range(elimination.after0[step], elimination.after0[step + 1]):
             other = wrench_of(connections, solver.mu, elimination.after[e])
-            subtract_product(lower_block(elimination, connections, solver, j, e), own, other)
+            subtract_product(lower[row : row + other.shape[0]], own, other)
+            row += other.shape[0]
     for step in range(elimination.order.shape[0] - 1, -1, -1):
         j = elimination.order[step]
-        own = wrench_of(connections, solver.mu, j)
+        later, column = solver.panel_row[: elimination.width[j]], 0
         for e in range(elimination.after0[step], elimination.after0[step + 1]):
             other = wrench_of(connections, solver.mu, elimination.after[e])
-            subtract_product(upper_block(elimination, connections, solver, j, e), other, own)
+            copy(other, later[column:])
+            column += other.shape[0]
+        subtract_product(upper_panel(elimination, connections, solver, j), later, wrench_of(connections, solver.mu, j))
 
 
 @inner

@@ -275,6 +275,7 @@ class Solver(NamedTuple):
     Z_a: Array = real(Size("accelerated pairs"), 6, 6)  #: product J_a X for each pair whose row marker is accelerated
     blocks: Array = real(Size("numbers of blocks"))  #: block matrix of the connections, flat
     block_pivot: IntArray = integer(n_w)
+    panel_row: Array = real(Size("widest panel"))  #: one row of the connections that are eliminated later
     mu: Array = real(n_w)  #: correction of the wrenches, times c_k
     y: Array = real(n_u)  #: correction of the body unknowns
     y_rate: Array = real(n_u)  #: velocity correction of the bodies, divided by c_d/c_k
@@ -367,6 +368,7 @@ def sizes_of(model: Model) -> dict[str, int]:
             "results": int(max(np.diff(model.tapes.operation0), default=0)),
             "numbers of H": int(bodies.h0[-1]),
             "numbers of blocks": int(model.elimination.n_store),
+            "widest panel": int(max(model.elimination.width, default=0)),
         }
     )
 
