@@ -9,7 +9,7 @@ import typer
 
 from cms.cli.arguments import SetValues, changes_of
 from cms.cli.console import guarded, output_path, print_table, say, say_written, stages, vector_words
-from cms.cli.outputs import PICTURES, TABLES, output_file, write_outputs
+from cms.cli.outputs import PICTURES, TABLES, output_file, output_files, write_outputs
 
 if TYPE_CHECKING:
     from floatframe.analyses.linear.linearization import LinearSystem
@@ -150,7 +150,8 @@ def modes_command(
         list[int], typer.Option("--animate", "-a", min=1, help="Make a film of this mode; repeatable.")
     ] = [],  # noqa: B006
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Film (.gif, .mp4) or picture (.png) of the mode.")
+        Path | None,
+        typer.Option("--output", "-o", help="Table (.csv, ...); with --animate film (.gif, .mp4) or picture (.png)."),
     ] = None,
     color: Annotated[str, typer.Option(help="Colour of the film: displacement or von-mises.")] = "displacement",
     formulation: Formulation = None,
@@ -163,7 +164,7 @@ def modes_command(
 
     With --animate 3 and without -o the film of mode 3 of crane.toml is crane.mode3.gif.
 
-    Example: floatframe modes crane.toml
+    Example: floatframe modes crane.toml -o modes.csv
 
     Example: floatframe modes crane.toml --animate 1 --animate 2
 
@@ -176,11 +177,17 @@ def modes_command(
 
     if color not in BODY_COLORS:
         raise ModelError(f"--color {color}: expected one of {', '.join(BODY_COLORS)}{nearest(color, BODY_COLORS)}")
-    if output is not None and len(animate) != 1:
-        raise ModelError(f"--output {output}: expected --animate with the number of one mode, got {len(animate)}")
+    is_table = output is not None and output.suffix.lower() in TABLES
+    if output is not None and not is_table and len(animate) != 1:
+        raise ModelError(
+            f"--output {output}: expected a table ({', '.join(TABLES)}), or --animate with the number of one mode, got "
+            f"{len(animate)}"
+        )
     model, form = read_in_formulation(system, formulation, set_values)
-    films = {k: output_path(output, system.with_suffix(f".mode{k}.gif"), ModelError,
-                            overwrite_of=(system, *model.files), needs_file=True) for k in animate}  # fmt: skip
+    inputs = (system, *model.files)
+    tables = output_files([output] if is_table and output else None, [], TABLES, ModelError, overwrite_of=inputs)
+    films = {k: output_path(None if is_table else output, system.with_suffix(f".mode{k}.gif"), ModelError,
+                            overwrite_of=inputs, needs_file=True) for k in animate}  # fmt: skip
     linear = linearized(model, speed, axis, center, formulation=form)
     modes = system_modes(linear)
     per_second = 1 / model.units.time
@@ -201,15 +208,17 @@ def modes_command(
     }
     if json:
         typer.echo(json_module.dumps(record, indent=2))
-        return
-    print_table(
-        f"Modes of {model.name}" + (f" at {speed:g} rad/{model.units.time_symbol}" if speed else ""),
-        ("mode>", "Hz>", "damping>", "moves (share of the kinetic energy)"),
-        [(m["number"], f"{m['frequency_hz']:.6g}", damping_words(m), moving_words(m)) for m in record["modes"]],
-    )
-    left = len(modes.eigenvalues) - len(record["modes"])
-    say(f"{'stable' if modes.is_stable else 'unstable'}; {linear.n_z} independent motions"
-        + (f", {left} more modes (--modes)" if left > 0 else ""))  # fmt: skip
+        films = {}
+    else:
+        print_table(
+            f"Modes of {model.name}" + (f" at {speed:g} rad/{model.units.time_symbol}" if speed else ""),
+            ("mode>", "Hz>", "damping>", "moves (share of the kinetic energy)"),
+            [(m["number"], f"{m['frequency_hz']:.6g}", damping_words(m), moving_words(m)) for m in record["modes"]],
+        )
+        left = len(modes.eigenvalues) - len(record["modes"])
+        say(f"{'stable' if modes.is_stable else 'unstable'}; {linear.n_z} independent motions"
+            + (f", {left} more modes (--modes)" if left > 0 else ""))  # fmt: skip
+    write_outputs(tables, table=lambda: modes.to_table(model.units.time), record=record, is_quiet=json)
     for k, path in films.items():
         draw_mode_film(model, linear.equilibrium, modes, k, path, BODY_COLORS[color])
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from fe_models.files import read_table
 from tests.floatframe.cli.examples import PENDULUM
 from tests.floatframe.command import run_floatframe
 
@@ -64,7 +65,9 @@ of = "hinge"
 def test_eig_tells_the_frequency_of_the_textbook(pendulum):
     record = json.loads(invoke("modes", pendulum, "--json"))
     assert_allclose(record["modes"][0]["frequency_hz"], np.sqrt(1.5 * 9.81) / (2 * np.pi), rtol=1e-8)
-    assert "rod 100 %" in invoke("modes", pendulum)
+    table = pendulum.with_suffix(".modes.json")
+    assert "rod 100 %" in invoke("modes", pendulum, "-o", table)
+    assert_allclose(read_table(table)["frequency"][0], record["modes"][0]["frequency_hz"], rtol=1e-12)
 
 
 def test_linearize_writes_the_state_space_of_the_pendulum(pendulum, tmp_path):

@@ -86,7 +86,7 @@ def test_eig_draws_modes_into_films_and_pictures(tmp_path, monkeypatch):
     modes("-a", 1, "-o", tmp_path / "one.png")
     assert (tmp_path / "one.png").read_bytes().startswith(b"\x89PNG")
     assert "expected 1 to 1, the modes" in modes("-a", 4, code=2)
-    assert "expected --animate with the number of one mode" in modes("-o", tmp_path / "x.gif", code=2)
+    assert "--animate with the number of one mode" in modes("-o", tmp_path / "x.gif", code=2)
     assert "did you mean 'von-mises'" in modes("-a", 1, "--color", "von-mise", code=2)
 
 
