@@ -1,12 +1,11 @@
 """Writing of an FMU: model description, binaries that run Python, and all files that the unit needs."""
 
 import hashlib
-import html
 import io
 import json
 import re
 import zipfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, distribution, version
 from pathlib import Path
@@ -14,6 +13,8 @@ from typing import Any
 
 import tomlkit
 
+from fe_models.foundation.documents.document import Answer, Document, Paragraph, Section, TextTable
+from fe_models.foundation.documents.html import html_page
 from fe_models.foundation.extras import extra_module
 from fe_models.foundation.paths import replace_file
 from floatframe.errors import FloatframeError, ModelError
@@ -143,12 +144,13 @@ VERSIONS = tuple(PACKAGES)
 #: module name in the resources, different for each version, because a process imports each name only once
 SCRIPT = "floatframe_unit_fmi{}"
 #: text of the documentation page in an FMU
-PAGE = """<p>The first run compiles code, a minute or less, once for each installation. Its binary is that of
-{package}.</p>
-<p>Time is in seconds. Force inputs are constant over a communication step; a drive takes its value, rate and
-acceleration, and follows them without jumps. The motion is that of the system file alone if the communication step is
-a multiple of its step, {step!r} s, and inputs are constant. Parameters are set before the initialisation ends.
-States can be saved, restored and serialised.</p>"""
+PARAGRAPHS = (
+    "The first run compiles code, a minute or less, once for each installation. Its binary is that of {package}.",
+    "Time is in seconds. Force inputs are constant over a communication step; a drive takes its value, rate and "
+    "acceleration, and follows them without jumps. The motion is that of the system file alone if the communication "
+    "step is a multiple of its step, {step!r} s, and inputs are constant. Parameters are set before the initialisation "
+    "ends. States can be saved, restored and serialised.",
+)
 EPOCH = (1980, 1, 1, 0, 0, 0)  #: date of all files in an FMU, so that the same system gives the same bytes
 
 
@@ -231,9 +233,9 @@ def write_fmu(
         files[f"{package_folder.name}/{each.name}"] = each.read_bytes()
     binaries = binaries_of(package_folder, about.identifier)
     archive = {"modelDescription.xml": model_description(about, variables, fmi)} | binaries
-    page = PAGE.format(package=package_folder.name, step=about.step)
+    paragraphs = [words.format(package=package_folder.name, step=about.step) for words in PARAGRAPHS]
     archive |= {f"resources/{name}": data for name, data in files.items()}
-    archive["documentation/index.html"] = documentation(about, variables, page).encode()
+    archive["documentation/index.html"] = documentation(about, variables, paragraphs)
     archive |= licences(package_folder.name)
     replace_file(path, zipped(archive))
     return WrittenFmu(path, variables, tuple(sorted({name.split("/")[1] for name in binaries})))
@@ -300,21 +302,18 @@ def licences(package: str) -> dict[str, bytes]:
     }
 
 
-def documentation(about: Description, variables: Sequence[Variable], page: str) -> str:
-    """Return the documentation page of an FMU; page: additional paragraphs in HTML."""
-    rows = "\n".join(
-        "<tr>" + "".join(f"<td>{html.escape(text)}</td>" for text in (v.name, v.causality, v.unit, v.words)) + "</tr>"
-        for v in variables
+def documentation(about: Description, variables: Sequence[Variable], paragraphs: Iterable[str]) -> bytes:
+    """Return the documentation page of an FMU."""
+    rows = [(v.name, v.causality, v.unit, v.words) for v in variables]
+    sections = (
+        Section("use", "How to use it", [Paragraph(words) for words in paragraphs]),
+        Section("variables", "Variables", (TextTable(("variable", "kind", "unit", "what it is"), rows),)),
     )
-    return f"""<!DOCTYPE html>
-<html><head><meta charset="utf-8"><title>{html.escape(about.name)}</title></head><body>
-<h1>{html.escape(about.name)}</h1>
-<p>{html.escape(about.words)} Written by {html.escape(about.tool)}.</p>
-{page}
-<table><tr><th>variable</th><th>kind</th><th>unit</th><th>what</th></tr>
-{rows}
-</table></body></html>
-"""
+    page = Document(
+        about.name, about.words, Answer(f"{len(variables)} variables; times in seconds."), sections,
+        kind="functional mock-up unit", footer=f"Written by {about.tool}.",
+    )  # fmt: skip
+    return html_page(page).encode()
 
 
 def zipped(files: Mapping[str, bytes]) -> bytes:

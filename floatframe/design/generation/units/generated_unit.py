@@ -98,9 +98,12 @@ VERSIONS = (2, 3)
 WORDS = "Multibody system {}: equations of motion as generated C, without runtime dependencies."
 STEP = "step"  #: name of the parameter of the unit
 #: text of the documentation page
-PAGE = """<p>The sources are in the folder sources.</p>
-<p>Time is in seconds. In co-simulation, forces are constant over a communication step. The classical Runge-Kutta
-method divides it into equal steps of at most the parameter {}. States can be saved, restored and serialised.</p>"""
+PARAGRAPHS = (
+    "The sources are in the folder sources.",
+    "Time is in seconds. In co-simulation, forces are constant over a communication step. The classical Runge-Kutta "
+    f"method divides it into equal steps of at most the parameter {STEP}. States can be saved, restored and "
+    "serialised.",
+)
 STABLE = 2.6  #: largest product of the step and the fastest frequency
 
 
@@ -184,7 +187,7 @@ def generate_fmu(
         archive["sources/buildDescription.xml"] = build_description(about)
     archive["modelDescription.xml"] = model_description(about, variables, fmi)
     archive[f"binaries/{folder}/{name}{suffix}"] = library
-    archive["documentation/index.html"] = documentation(about, variables, PAGE.format(STEP)).encode()
+    archive["documentation/index.html"] = documentation(about, variables, PARAGRAPHS)
     try:
         replace_file(target, zipped(archive))
     except OSError as error:

@@ -131,6 +131,8 @@ def test_the_description_says_what_it_needs_and_in_which_units(fmu):
     with zipfile.ZipFile(fmu[1]) as archive:
         assert {"documentation/index.html", "resources/system.toml"} <= set(archive.namelist())
         assert any(name.startswith("documentation/licenses/pythonfmu") for name in archive.namelist())
+        page = archive.read("documentation/index.html").decode()
+    assert all(f">{name}</td>" in page for name in variables)
 
 
 def test_the_same_system_makes_the_same_bytes(arm, fmu, tmp_path):
