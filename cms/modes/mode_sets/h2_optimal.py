@@ -13,13 +13,7 @@ from cms.errors import ModeSetError
 from cms.modes.families.families import Families, body_of, families_of
 from cms.modes.mode_set import Block, ModeSet, boundary_block, mode_set, require_interfaces, rigid_block
 from cms.modes.mode_sets.balanced import balance
-from cms.modes.mode_sets.elastic_system import (
-    ElasticSystem,
-    check_options,
-    chosen_dofs,
-    damping_description,
-    elastic_system,
-)
+from cms.modes.mode_sets.elastic_system import check_options, chosen_dofs, damping_description, elastic_system
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.tall.columns import combine
@@ -263,9 +257,9 @@ def first_independent(V: Array, fixed: Array, n: int) -> Array:
     return found[:, fixed.shape[1] :]
 
 
-def dominant_modes(system: ElasticSystem) -> Array:
+def dominant_modes(problem: H2Problem) -> Array:
     """Return unit columns of the modes by descending H2 norm |b bᵀ| / sqrt(2 d omega²) of their transfer functions."""
-    norm = np.einsum("kb,kb->k", system.B, system.B) / np.sqrt(np.diag(system.D) * system.omega2)
+    norm = np.einsum("kb,kb->k", problem.B, problem.B) / np.sqrt(np.diag(problem.D) * problem.omega2)
     return np.eye(len(norm))[:, np.argsort(-norm, kind="stable")]
 
 
@@ -355,7 +349,7 @@ def h2_optimal(
         if static:
             fixed = la.orth(system.B / np.sqrt(system.omega2)[:, None], rcond=NOTHING_NEW)
         starts = {
-            "dominant free modes": dominant_modes(replace(system, B=problem.B)),
+            "dominant free modes": dominant_modes(problem),
             "balanced directions": balance(system.omega2, system.D, problem.B).T,
         }
         most = len(system.omega2) - fixed.shape[1]
