@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from cms.errors import ModeSetError
 from cms.modes.families.families import Families
 from cms.modes.mode_sets import balanced_truncation, h2_optimal, krylov, normal_modes, rubin
-from cms.modes.mode_sets.h2_optimal import H2Problem, pole_residues
+from cms.modes.mode_sets.h2_optimal import H2Problem, best_directions, pole_residues
 from fe_models.body.couplings.couplings import couple
 from tests.bodies import bar, chain
 from tests.campaign.random_bodies import random_body
@@ -96,6 +96,19 @@ def test_the_gradient_is_that_of_the_lyapunov_error(coupled):
         slope = (lyapunov_error(*parts, V + h * dV) - lyapunov_error(*parts, V - h * dV)) / (2 * h)
         assert_allclose(np.sum(G * dV), slope, rtol=0, atol=1e-6 * la.norm(G) * la.norm(dV))
     assert_allclose(V.T @ G, 0, rtol=0, atol=1e-11 * la.norm(V) * la.norm(G))  # the error depends on the span alone
+
+
+@pytest.mark.parametrize("best", ["lowest", "highest"])
+def test_the_start_with_the_least_error_is_taken_and_improved(best):
+    problem = H2Problem(*system())
+    columns = {"lowest": np.eye(8), "highest": np.eye(8)[:, ::-1]}
+    if best == "highest":
+        problem = H2Problem(problem.omega2, problem.D, problem.B * np.linspace(0, 5, 8)[:, None] ** 2)
+    errors = {name: problem.error(V[:, :3]) for name, V in columns.items()}
+    assert min(errors, key=errors.get) == best
+    found = best_directions(problem, np.zeros((8, 0)), columns, 3, 5)
+    assert found.start == best
+    assert found.error**2 < errors[best]
 
 
 def whole_body(body, n_rigid, ratio=RATIO):
@@ -226,10 +239,11 @@ def test_damping_of_the_body_counts():
         h2_optimal(free, n_modes=2, damping_ratio=0.0)
 
 
-def test_an_iteration_that_ends_early_says_so(body, caplog):
-    few = h2_optimal(body, n_modes=8, max_iterations=2)
-    assert few.options["iterations"] == "2, not stationary"
-    assert "not stationary after 2 iterations: the last 2 lowered it by" in caplog.text
+@pytest.mark.parametrize("most", [2, 10])
+def test_an_iteration_that_ends_early_says_so(body, caplog, most):
+    few = h2_optimal(body, n_modes=8, max_iterations=most)
+    assert few.options["iterations"] == f"{most}, not stationary"
+    assert f"not stationary after {most} iterations: the last {most} lowered it by" in caplog.text
     assert "give more max_iterations" in caplog.text
     caplog.clear()
     assert h2_optimal(body, n_modes=8).options["iterations"].endswith(", stationary")
