@@ -1,6 +1,6 @@
 """Coordinates, forces and states of couplers and user forces during a motion."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +9,7 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
 from fe_models.foundation.words import nearest, quoted
 from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.kernels.model import Model
 from floatframe.errors import ResultsError
 from floatframe.model.forces import UserForce
 from floatframe.model.system import System
@@ -63,25 +64,30 @@ def user_force_motion(system: System, trajectory: Trajectory, name: str) -> User
     if name not in names:
         raise ResultsError(f"user_force_motion: no user force {quoted(name)}{nearest(name, names)}")
     u = names.index(name)
-    model, w, force = compiled_system(system).model, unknowns(system, trajectory), forces[u]
+    model, force = require_same_unknowns(system, trajectory), forces[u]
     k = len(system.couplers) + u
     values = model.coordinates.row[model.elements.coordinate0[k] : model.elements.coordinate0[k + 1]]
     states = model.states.row[model.elements.state0[k] : model.elements.state0[k + 1]]
     return UserForceMotion(
         trajectory.t,
-        {each: w[:, row] for each, row in zip(force.coordinates, values, strict=True)},
-        {each: w[:, row + 1] for each, row in zip(force.coordinates, values, strict=True)},
-        {each: w[:, model.elements.core[k] + j] for j, each in enumerate(force.forces)},
-        {each: w[:, row] for each, row in zip(force.states, states, strict=True)},
+        named_unknowns(trajectory, force.coordinates, values),
+        named_unknowns(trajectory, force.coordinates, values + 1),
+        named_unknowns(trajectory, force.forces, model.elements.core[k] + np.arange(len(force.forces))),
+        named_unknowns(trajectory, force.states, states),
     )
 
 
-def unknowns(system: System, trajectory: Trajectory) -> Array:
-    """Return all unknowns of connections, (n_t, n_w); `ResultsError` if the motion belongs to another system."""
-    w = trajectory.source.read("w")
-    if w.shape[1] != int(compiled_system(system).model.connections.w0[-1]):
+def require_same_unknowns(system: System, trajectory: Trajectory) -> Model:
+    """Return the compiled model of a system; `ResultsError` if the motion belongs to another system."""
+    model = compiled_system(system).model
+    if trajectory.head.w0[-1] != int(model.connections.w0[-1]):
         raise ResultsError(f"the motion of {trajectory.head.system!r} is not one of the system {system.name!r}")
-    return w
+    return model
+
+
+def named_unknowns(trajectory: Trajectory, names: Iterable[str], rows: Iterable[int]) -> dict[str, Array]:
+    """Return unknowns of connections over time by name, (n_t,) each."""
+    return dict(zip(names, trajectory.unknowns([int(row) for row in rows]).T, strict=True))
 
 
 def coupler_motion(system: System, trajectory: Trajectory, name: str) -> CouplerMotion:
@@ -104,9 +110,11 @@ def coupler_motion(system: System, trajectory: Trajectory, name: str) -> Coupler
     names = [coupler.name for coupler in system.couplers]
     if name not in names:
         raise ResultsError(f"coupler_motion: no coupler {quoted(name)}{nearest(name, names)}")
-    model, w = compiled_system(system).model, unknowns(system, trajectory)
+    model = require_same_unknowns(system, trajectory)
     k = names.index(name)
     places = slice(int(model.elements.coordinate0[k]), int(model.elements.coordinate0[k + 1]))
     rows = model.coordinates.row[places]
-    force = np.outer(w[:, model.elements.core[k]], model.coordinates.factor[places])
-    return CouplerMotion(trajectory.t, w[:, rows], w[:, rows + 1], force)
+    force = trajectory.unknowns([int(model.elements.core[k])]) * model.coordinates.factor[places]
+    return CouplerMotion(
+        trajectory.t, trajectory.unknowns(rows.tolist()), trajectory.unknowns((rows + 1).tolist()), force
+    )

@@ -11,15 +11,14 @@ from fe_models.foundation.records import checked_fields
 from fe_models.foundation.words import nearest, quoted
 from floatframe.engine.compiling.callbacks import raise_errors_of
 from floatframe.engine.compiling.callbacks.law_functions import called_law, law_callbacks
-from floatframe.engine.compiling.markers import MarkerData
 from floatframe.engine.compiling.public_elements import PlacedLaw
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import ModelError, ResultsError
-from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.elements.switched_off import law_switched_off, times_off
 from floatframe.model.system import System
-from floatframe.results.coordinate_elements import unknowns
-from floatframe.results.place_motion import PlaceMotion, as_moved, shape_motion, still_place
+from floatframe.results.coordinate_elements import named_unknowns, require_same_unknowns
+from floatframe.results.joint_coordinates import end_motion
+from floatframe.results.place_motion import PlaceMotion
 from floatframe.results.trajectory import Trajectory
 
 __all__ = ["ElementMotion", "element_motion", "placed_law"]
@@ -82,11 +81,12 @@ def element_motion(system: System, trajectory: Trajectory, name: str) -> Element
         If there is no such element, or the motion is of another system.
     """
     placed = placed_law(system, name)
-    w = unknowns(system, trajectory)
-    places = [marker_place(system, trajectory, marker) for marker in placed.markers]
+    require_same_unknowns(system, trajectory)
+    places = [end_motion(system, trajectory, marker, name) for marker in placed.markers]
     law = placed.law
+    states, multipliers = placed.states, placed.multipliers
     motion = [motion_row(place, law.accelerations) for place in places]
-    inputs = np.column_stack([trajectory.t, *motion, w[:, placed.states], w[:, placed.multipliers]])
+    inputs = np.column_stack([trajectory.t, *motion, trajectory.unknowns([*states, *multipliers])])
     n_all, data = placed.n_out + len(law.outputs), np.asarray(law.data)
     out = called_law(placed.value.address, placed.head, data, inputs, n_all)
     raise_errors_of([placed.value])
@@ -99,22 +99,10 @@ def element_motion(system: System, trajectory: Trajectory, name: str) -> Element
     return ElementMotion(
         trajectory.t,
         {each: out[:, placed.n_out + k] for k, each in enumerate(law.outputs)},
-        {each: w[:, row] for each, row in zip(law.states, placed.states, strict=True)},
-        {each: w[:, row] for each, row in zip(law.multipliers, placed.multipliers, strict=True)},
+        named_unknowns(trajectory, law.states, states),
+        named_unknowns(trajectory, law.multipliers, multipliers),
         out[:, : 6 * n].reshape(-1, n, 6),
     )
-
-
-def marker_place(system: System, trajectory: Trajectory, marker: MarkerData) -> PlaceMotion:
-    """Return the motion of a marker at which an element acts."""
-    if marker.body < 0:
-        return still_place(trajectory.t, marker.shape)
-    body = system.bodies[marker.body]
-    if isinstance(body, FlexibleBody):
-        motion, _ = as_moved(trajectory, body.name, body.reduced)
-    else:
-        motion = trajectory.body(body.name)
-    return shape_motion(motion, marker.shape)
 
 
 def motion_row(place: PlaceMotion, accelerations: bool) -> Array:

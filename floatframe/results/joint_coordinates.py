@@ -12,16 +12,14 @@ from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.bodies.marker_shape import interface_shape
 from floatframe.model.bodies.markers import body_name
 from floatframe.model.joints import Joint
-from floatframe.model.joints.rows import SPAN, TWIST_B, RelativePlace, RowCoordinate
+from floatframe.model.joints.rows import RowCoordinate
 from floatframe.model.joints.sliding import SlidingJoint, line_triad
 from floatframe.model.rotations import cross, dot, left_jacobian, rotated, rotation_matrix
 from floatframe.model.system import System
 from floatframe.results.place_motion import PlaceMotion, as_moved, shape_motion, still_place
-from floatframe.results.small_motions.rows import Rows
-from floatframe.results.small_motions.small_motions import SmallMotions
 from floatframe.results.trajectory import Trajectory
 
-__all__ = ["SlidingPlace", "as_placed", "end_motion", "force_rows", "sliding_place"]
+__all__ = ["SlidingPlace", "as_placed", "end_motion", "sliding_place"]
 
 
 # the coordinate of a sliding joint during a motion: the position of B along the deformed line -------------------------
@@ -147,35 +145,11 @@ def row_coordinate(system: System, joint: Joint, ends: tuple[MarkerData, MarkerD
     return next(row.coordinate for row in rows if row.coordinate is not None and row.coordinate.name == name)
 
 
-def force_rows(small: SmallMotions, joint: str, coordinate: str) -> Rows | None:
-    """Return one row with the change of the force along a coordinate, -E · dw - w · dE; None along a deformed line.
-
-    E rotates with the marker in which it is fixed, or with the line between the points of a distance.
-    """
-    found = next(each for each in small.system.joints if each.name == joint)
-    if isinstance(found, SlidingJoint):
-        return None
-    ends = joint_markers(small.system, found, small.compiled.placed)
-    own = row_coordinate(small.system, found, ends, coordinate)
-    a, b = (small.place(end, joint) for end in ends)
-    d = b.position - a.position
-    E = own.direction(RelativePlace(a.axes, b.axes, d))
-    first = small.wrench(joint).start
-    loads = [(slice(first + part, first + part + 3), factor) for part, factor in own.parts]
-    w = np.sum([factor * small.work.state.w[place] for place, factor in loads], axis=0)
-    rows = small.by_motion(np.zeros((1, small.n_x)))
-    for place, factor in loads:
-        rows = rows - small.by_wrench(place, factor).mapped(E)
-    if own.kind == SPAN:
-        return rows - (b.moved - a.moved).mapped((w - (w @ E) * E) / np.linalg.norm(d))
-    holder = b if own.kind == TWIST_B else a
-    return rows - holder.rotation.mapped(np.cross(E, w))
-
-
-def end_motion(system: System, trajectory: Trajectory, end: MarkerData) -> PlaceMotion:
-    """Return the motion of a marker, with its axes."""
+def end_motion(system: System, trajectory: Trajectory, end: MarkerData, connection: str = "") -> PlaceMotion:
+    """Return the motion of a marker, with its axes; a marker on the ground moves with that side of its connection."""
     if end.body < 0:
-        return still_place(trajectory.t, end.shape)
+        ground = trajectory.ground(connection)
+        return still_place(trajectory.t, end.shape) if ground is None else shape_motion(ground, end.shape)
     body = system.bodies[end.body]
     motion = trajectory.body(body.name)
     if isinstance(body, FlexibleBody):

@@ -33,7 +33,6 @@ from floatframe.results.trajectory import BodyMotion, Trajectory
 __all__ = [
     "PlaceMotion",
     "angle_and_rate",
-    "angle_and_slope",
     "interface_motion",
     "largest_von_mises",
     "nodal_stress",
@@ -218,20 +217,14 @@ def normals_of_axis(axis: Array | tuple[float, float, float]) -> tuple[Array, Ar
 
 
 def angle_and_rate(a: PlaceMotion, b: PlaceMotion, x: Array, y: Array) -> tuple[Array, Array]:
-    """Return the angle from x of a (towards y) to x of b, between -pi and pi, and its rate, (n_t,)."""
-    angle, slope = angle_and_slope(a.axes, b.axes, x, y)
-    return angle, dot(slope, b.omega - a.omega)
+    """Return the angle from x of a (towards y) to x of b, between -pi and pi, and its rate, (n_t,).
 
-
-def angle_and_slope(A_a: Array, A_b: Array, x: Array, y: Array) -> tuple[Array, Array]:
-    """Return the angle from x of a (towards y) to x of b, (...,), and its derivative by a rotation of b, (..., 3).
-
-    With C and S, cosine and sine times a factor: d(angle) = (C Y - S X) · (theta × D) / (C² + S²), ground axes.
+    With C and S, cosine and sine times a factor: rate = (C Y - S X) · (omega × D) / (C² + S²), ground axes.
     """
-    X, Y, D = A_a @ x, A_a @ y, A_b @ x
+    X, Y, D = a.axes @ x, a.axes @ y, b.axes @ x
     C, S = dot(X, D)[..., None], dot(Y, D)[..., None]
     slope = cross(D, C * Y - S * X) / np.maximum(C**2 + S**2, np.finfo(float).tiny)
-    return np.arctan2(S, C)[..., 0], slope
+    return np.arctan2(S, C)[..., 0], dot(slope, b.omega - a.omega)
 
 
 def nodal_stress(trajectory: Trajectory, body: str, reduced: ReducedBody, i_time: int) -> Array:

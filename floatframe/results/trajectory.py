@@ -1,6 +1,7 @@
 """A computed motion, read from a results file or returned by `integrate`."""
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -190,12 +191,20 @@ class Trajectory:
         is_last = i_time in (-1, len(self.t) - 1)
         return State(r, p, q, u, w, angle, watched=self.head.summary.get("watched") if is_last else None)
 
+    def ground(self, connection: str) -> BodyMotion | None:
+        """Return the motion of the ground side of a connection; None if it is fixed, as in every computed motion."""
+        return None
+
+    def unknowns(self, chosen: Sequence[int]) -> Array:
+        """Return some unknowns of connections by their numbers, (n_t, len(chosen))."""
+        return self.source.read("w")[:, list(chosen)]
+
     def reaction(self, name: str) -> Reaction:
         """Return force and moment that a joint or spring-damper exerts on its marker A."""
         if name not in self.connection_names:
             raise ResultsError(f"trajectory: no joint or spring {quoted(name)}{nearest(name, self.connection_names)}")
         c = self.connection_names.index(name)
-        w = self.source.read("w")[:, self.head.w0[c] : self.head.w0[c + 1]]
+        w = self.unknowns(range(self.head.w0[c], self.head.w0[c + 1]))
         moment = w[:, 3:6] if w.shape[1] >= 6 else np.zeros((len(w), 3))
         return Reaction(w[:, :3], moment)
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any, Protocol, cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -18,7 +18,8 @@ from floatframe.model.system import Named, System
 from floatframe.results.sensors import coordinate_sensors, named_coordinates, sensor_and_column
 from floatframe.results.sensors.channels import VALUE, Channel, StressChannel
 from floatframe.results.sensors.joint_coordinate import JointCoordinate
-from floatframe.results.sensors.measurement import Measurement
+from floatframe.results.sensors.linear_columns import linear_columns
+from floatframe.results.sensors.measurement import AnyOutput, Measurement
 from floatframe.results.small_motions.rows import LinearColumns, Rows, joined
 from floatframe.results.small_motions.small_motions import SmallMotions
 from floatframe.results.trajectory import Trajectory
@@ -39,20 +40,6 @@ __all__ = [
 
 
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")  #: components of the motion of a place
-
-
-class AnyOutput(Protocol):
-    """A sensor that measures over time and can be linearised."""
-
-    @property
-    def name(self) -> str:
-        """Name of the output."""
-
-    def measure(self, system: System, trajectory: Trajectory) -> Measurement:
-        """Return named columns over time."""
-
-    def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the same columns as functions of small motions, if they are linear."""
 
 
 AnyInput = Channel | JointCoordinate | DriveMotion | BaseMotion | ParameterInput | ForceInput
@@ -89,7 +76,7 @@ class Column:
 
     def linear(self, small: SmallMotions) -> LinearColumns:
         """Return the column as a function of small motions; `ModelError` if it is not linear."""
-        found = self.sensor.linear(small)
+        found = linear_columns(self.sensor, small)
         self.require([*found.columns, *found.not_linear])
         if self.column in found.not_linear:
             raise ModelError(f"output {self.name!r} is not linear here: {found.not_linear[self.column]}")
@@ -128,7 +115,7 @@ def observed(small: SmallMotions, outputs: Iterable[AnyOutput]) -> Observed:
     values: list[float] = []
     left_out: dict[str, str] = {}
     for output in outputs:
-        linear, now = output.linear(small), output.measure(small.system, small.now)
+        linear, now = linear_columns(output, small), output.measure(small.system, small.now)
         is_single = len(linear.columns) + len(linear.not_linear) == 1
         named = {column: output.name if is_single else f"{output.name}.{column}" for column in linear.units}
         left_out |= {named[column]: why for column, why in linear.not_linear.items()}

@@ -33,7 +33,7 @@ from floatframe.model.functions.time_functions import TimeFunction, constant, po
 from floatframe.model.joints.rows import kind_of
 from floatframe.model.state import State
 from floatframe.model.system import System
-from floatframe.results.sensors.channels import QUANTITIES, Channel, rate_unit, require_rate
+from floatframe.results.sensors.channels import QUANTITIES, VALUE, Channel, rate_unit, require_rate
 from floatframe.results.sensors.joint_coordinate import JointCoordinate
 from floatframe.results.small_motions.small_motions import BaseColumn, InputForce, SmallMotions
 from floatframe.results.trajectory import Trajectory
@@ -226,8 +226,10 @@ def column_of(small: SmallMotions, k: int, channel: Any) -> tuple[Array, Array, 
         F, E = force_column(small, channel)
     elif isinstance(channel, JointCoordinate) and (row := free_row(small, channel)) is not None:
         E[row] = 1.0
+    elif isinstance(channel, JointCoordinate):
+        F = small.joint_coordinate(channel.joint, channel.coordinate, f"coordinate {channel.name!r}")
     else:
-        F = replace(channel, rate=0).linear(small).columns["value"].x[0, : small.n_u]
+        F = replace(channel, rate=0).linear(small).columns[VALUE].x[0, : small.n_u]
     return F, E, E_rate
 
 

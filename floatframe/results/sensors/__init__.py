@@ -1,6 +1,6 @@
 """Named sensors that measure a motion, in Python and in the tables [sensors.NAME] of a system file.
 
-`SENSORS` is the registry; a new sensor is a class with `measure` and `linear`, and its line there.
+`SENSORS` is the registry; a new sensor is a class with `measure`, and its line there.
 """
 
 from collections.abc import Sequence
@@ -77,7 +77,7 @@ __all__ = [
 
 def is_sensor(kind: Any) -> bool:
     """Whether an object is a class of sensors."""
-    return is_dataclass(kind) and all(callable(getattr(kind, method, None)) for method in ("measure", "linear"))
+    return is_dataclass(kind) and callable(getattr(kind, "measure", None))
 
 
 #: sensor classes by the `type` of a table [sensors.NAME]; their fields are the keys of the table. Other packages add
@@ -107,7 +107,7 @@ SENSORS: Registry[type[Sensor]] = Registry(
         "von-mises": VonMisesSensor,
     },
     ModelError,
-    kind="a dataclass with the methods measure and linear",
+    kind="a dataclass with the method measure",
     is_kind=is_sensor,
 )
 

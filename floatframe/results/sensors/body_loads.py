@@ -23,7 +23,7 @@ from floatframe.model.rotations import dot, rotation_matrix, tilde
 from floatframe.model.system import System
 from floatframe.results.joint_coordinates import end_motion
 from floatframe.results.recovery import require_same_modes
-from floatframe.results.sensors.linear_columns import load_linear, scalar_columns
+from floatframe.results.sensors.linear_columns import load_linear
 from floatframe.results.sensors.measurement import Measurement, load_columns, unit_words
 from floatframe.results.sensors.stresses import flexible_body
 from floatframe.results.small_motions.rows import LinearColumns, Rows, joined
@@ -176,7 +176,10 @@ class InterfaceForceSensor:
         return Measurement(self.name, trajectory.t, *load_columns(system.units, *vectors))
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return force and moment as linear functions of wrenches; in body axes also of motions."""
+        """Return force and moment as linear functions of wrenches; in body axes also of motions.
+
+        Forces of inputs act at interfaces too, and no recorded motion has them, so that differences would miss them.
+        """
         body, k = self.place(small.system)
         rows, frame = interface_load_rows(small, body)[k], small.frame_place(body.name)
         now = np.split(interface_loads(small.system, small.now, body)[k, 0], 2)
@@ -214,25 +217,13 @@ class SpringSensor:
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return length, rate and tension over time."""
-        a, b = (end_motion(system, trajectory, end) for end in self.ends(system))
+        a, b = (end_motion(system, trajectory, end, self.of) for end in self.ends(system))
         d = b.position - a.position
         length = np.linalg.norm(d, axis=1)
         e = d / np.where(length > 0, length, 1.0)[:, None]
         force = trajectory.reaction(self.of).force
         columns = {"length": length, "rate": dot(e, b.velocity - a.velocity), "tension": dot(e, force)}
         return Measurement(self.name, trajectory.t, columns, self.units(system))
-
-    def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return all columns as linear functions; with F along the line direction e: e · d(r_B - r_A), e · dF."""
-        a, b = (small.place(end, self.of) for end in self.ends(small.system))
-        d = b.position - a.position
-        length = float(np.linalg.norm(d))
-        if length == 0.0:
-            why = "a line of length zero has no direction"
-            return LinearColumns({}, self.units(small.system), dict.fromkeys(("length", "rate", "tension"), why))
-        row, first = (b.moved - a.moved).mapped(d / length), small.wrench(self.of).start
-        tension = small.by_wrench(slice(first, first + 3)).mapped(d / length)
-        return scalar_columns({"length": row, "rate": row.rate, "tension": tension}, self.units(small.system))
 
     def ends(self, system: System) -> list[MarkerData]:
         """Return both markers; `ModelError` suggests the closest name if the spring does not exist."""
@@ -295,7 +286,10 @@ class RecoverySensor:
         return small.by_motion(np.concatenate([np.zeros((6, small.n_x)), z.x[6:]])), z.rate
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the rows as functions of small motions and wrenches about a state at rest."""
+        """Return the rows as functions of small motions and wrenches about a state at rest.
+
+        The loads on interfaces contain forces of inputs, which no recorded motion has.
+        """
         body, table, rows = self.found(small.system)
         units = {table.labels[row]: table.units[row] for row in rows}
         if small.is_turning:

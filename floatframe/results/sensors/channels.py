@@ -95,7 +95,10 @@ class Channel:
         return Measurement(self.name, trajectory.t, {VALUE: total}, {VALUE: self.units(system.units)})
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the motion along the direction as a linear function of motions relative to the rotating system."""
+        """Return the motion along the direction as a linear function of motions relative to the rotating system.
+
+        What is measured over time is relative to the ground; the row is also the direction of an input force, exactly.
+        """
         rows = small.by_motion(np.zeros((1, small.n_x)))
         for sign, marker in self.markers:
             place = self.place(small, marker)

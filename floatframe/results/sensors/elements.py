@@ -7,8 +7,6 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.records import checked_fields, frozen_copies
 from fe_models.foundation.words import nearest, quoted
-from floatframe.engine.compiling.callbacks import raise_errors_of
-from floatframe.engine.compiling.callbacks.law_slopes import difference_slopes
 from floatframe.engine.compiling.counted_angles import CountedAngle, rotation_of
 from floatframe.engine.compiling.markers import MarkerData
 from floatframe.engine.compiling.pair_forces import bushing_markers
@@ -24,43 +22,10 @@ from floatframe.results.coordinate_elements import coupler_motion, user_force_mo
 from floatframe.results.element_motion import element_motion
 from floatframe.results.joint_coordinates import end_motion
 from floatframe.results.place_motion import PlaceMotion
-from floatframe.results.sensors.linear_columns import scalar_columns
 from floatframe.results.sensors.measurement import Measurement, unit_words
-from floatframe.results.small_motions.rows import LinearColumns, Rows, joined
-from floatframe.results.small_motions.small_motions import SmallMotions, SmallPlace
 from floatframe.results.trajectory import Trajectory
 
-__all__ = ["BushingSensor", "ControlSensor", "CouplerSensor", "ElementSensor", "output_rows"]
-
-
-# outputs of an element as functions of small motions, from derivatives of its law -------------------------------------
-
-
-def output_rows(placed: PlacedLaw, small: SmallMotions) -> Rows:
-    """Return the outputs of an element as linear functions of small motions, one row each."""
-    model, work = small.compiled.model, small.work
-    c, n = placed.connection, len(placed.markers)
-    first = int(model.connections.a[c])
-    markers = work.markers
-    motion = []
-    for m in range(first, first + n):
-        motion += [markers.r[m], markers.A[m].ravel(), markers.v[m], markers.omega[m]]
-        if placed.law.accelerations:
-            motion.append(markers.acceleration[model.markers.accelerated[m]])
-    unknown = [*placed.states, *placed.multipliers]
-    inputs = np.concatenate([[float(work.state.time)], *motion, work.state.w[unknown]])
-    slopes = difference_slopes(placed.value.address, placed.head, placed.law.data, inputs, placed.sizes)
-    slopes = slopes[placed.n_out :]
-    raise_errors_of([placed.value])
-    parts = []
-    for marker in placed.markers:
-        place = small.place(marker, placed.element.name)
-        parts += [place.moved, place.rotation, place.velocity, place.omega]
-        if placed.law.accelerations:
-            parts += [place.acceleration, place.alpha]
-    if unknown:
-        parts.append(small.by_wrench(unknown))
-    return joined(parts).mapped(slopes)
+__all__ = ["BushingSensor", "ControlSensor", "CouplerSensor", "ElementSensor"]
 
 
 # sensors of couplers and user forces: their coordinates, rates, forces and states -------------------------------------
@@ -94,18 +59,6 @@ class CouplerSensor:
             columns |= dict(zip(own, (found.value[:, k], found.rate[:, k], found.force[:, k]), strict=True))
             units |= dict(zip(own, coordinate_units(system, is_angle), strict=True))
         return Measurement(self.name, trajectory.t, columns, units)
-
-    def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return all columns as linear functions; they are unknowns like the wrenches."""
-        model = small.compiled.model
-        k = self.coupler_names(small.system).index(self.of)
-        columns: dict[str, Rows] = {}
-        for p in range(int(model.elements.coordinate0[k]), int(model.elements.coordinate0[k + 1])):
-            n, row = p - int(model.elements.coordinate0[k]) + 1, int(model.coordinates.row[p])
-            force = small.by_wrench([int(model.elements.core[k])], float(model.coordinates.factor[p]))
-            columns |= {f"value {n}": small.by_wrench([row]), f"rate {n}": small.by_wrench([row + 1])}
-            columns[f"force {n}"] = force
-        return scalar_columns(columns, dict(self.measure(small.system, small.now).units))
 
     def coupler_names(self, system: System) -> list[str]:
         """Return the names of the couplers; `ModelError` with the closest one if the sensor's coupler is missing."""
@@ -147,19 +100,6 @@ class ControlSensor:
         columns |= found.states
         units |= dict.fromkeys(found.states, "-")
         return Measurement(self.name, trajectory.t, columns, units)
-
-    def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return all columns except states, which are not linear here (see `linearize`), as unknowns."""
-        model = small.compiled.model
-        forces, u = self.user_forces(small.system)
-        k, acting = len(small.system.couplers) + u, list(forces[u].forces)
-        columns: dict[str, Rows] = {}
-        for p, name in enumerate(forces[u].coordinates, start=int(model.elements.coordinate0[k])):
-            row = int(model.coordinates.row[p])
-            columns |= {name: small.by_wrench([row]), f"{name}_dot": small.by_wrench([row + 1])}
-            if name in acting:
-                columns[f"{name} force"] = small.by_wrench([int(model.elements.core[k]) + acting.index(name)])
-        return scalar_columns(columns, dict(self.measure(small.system, small.now).units))
 
     def user_forces(self, system: System) -> tuple[list[UserForce], int]:
         """Return the user forces and the index of the sensor's one; `ModelError` with the closest name if missing."""
@@ -215,18 +155,6 @@ class ElementSensor:
         found = element_motion(system, trajectory, self.of)
         columns: dict[str, Array] = {**found.outputs, **found.states, **found.multipliers}
         return Measurement(self.name, trajectory.t, {name: columns[name] for name in units}, units)
-
-    def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return all columns: outputs from derivatives of the law; states and multipliers as unknowns."""
-        placed = self.placed(small.system)
-        units = self.units_of(placed)
-        law = placed.law
-        names = dict(zip((*law.states, *law.multipliers), (*placed.states, *placed.multipliers), strict=True))
-        columns = {name: small.by_wrench([names[name]]) for name in units if name in names}
-        if any(name in law.outputs for name in units):
-            rows = output_rows(placed, small)
-            columns |= {name: rows[law.outputs.index(name)] for name in units if name in law.outputs}
-        return LinearColumns({name: columns[name] for name in units}, units, {})
 
     def placed(self, system: System) -> PlacedLaw:
         """Return the element; `ModelError` suggests the closest name if it does not exist."""
@@ -288,7 +216,7 @@ class BushingSensor:
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return deformations and rates over time."""
         ends, share = self.ends(system), AXES[self.bushing(system).axes]
-        a, b = (end_motion(system, trajectory, end) for end in ends)
+        a, b = (end_motion(system, trajectory, end, self.of) for end in ends)
         theta = rotation_log(np.swapaxes(a.axes, -1, -2) @ b.axes)
         if self.bushing(system).counts_turns:
             theta = counted(trajectory, rotation_of(*ends), theta)
@@ -296,18 +224,6 @@ class BushingSensor:
         rates = deformation_rates(C, e, theta, share, b.velocity - a.velocity, a.omega, b.omega)
         columns = np.hstack([e, theta, rates]).T
         return Measurement(self.name, trajectory.t, dict(zip(NAMES, columns, strict=True)), self.units(system))
-
-    def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the change of the deformations; the rows of the rates are the rates of these rows."""
-        now = self.measure(small.system, small.now).columns
-        theta = np.array([now[name][0] for name in DEFORMATIONS[3:]])
-        a, b = (small.place(end, self.of) for end in self.ends(small.system))
-        share = AXES[self.bushing(small.system).axes]
-        unit_motions = np.split(np.eye(9), 3, axis=1)
-        slopes = deformation_rates(*deformed_axes(a, b, theta, share), theta, share, *unit_motions).T
-        moved = joined([b.moved - a.moved, a.rotation, b.rotation]).mapped(slopes)
-        rows = [part[k] for part in (moved, moved.rate) for k in range(len(DEFORMATIONS))]
-        return scalar_columns(dict(zip(NAMES, rows, strict=True)), self.units(small.system))
 
     def ends(self, system: System) -> tuple[MarkerData, MarkerData]:
         """Return both markers."""
@@ -327,9 +243,7 @@ class BushingSensor:
         return {name: unit_words(system.units, kinds[k // 3]) for k, name in enumerate(NAMES)}
 
 
-def deformed_axes(
-    a: PlaceMotion | SmallPlace, b: PlaceMotion | SmallPlace, theta: Array, share: float
-) -> tuple[Array, Array]:
+def deformed_axes(a: PlaceMotion, b: PlaceMotion, theta: Array, share: float) -> tuple[Array, Array]:
     """Return C, (..., 3, 3), and e, (..., 3)."""
     C = a.axes @ rotation_exp(share * theta)
     return C, np.einsum("...ba,...b->...a", C, b.position - a.position)

@@ -19,12 +19,9 @@ from floatframe.model.joints.sliding import SlidingJoint
 from floatframe.model.rotations import cross, dot
 from floatframe.model.system import System
 from floatframe.results.full_turns import through_turns
-from floatframe.results.joint_coordinates import as_placed, end_motion, force_rows, sliding_place
+from floatframe.results.joint_coordinates import as_placed, end_motion, sliding_place
 from floatframe.results.sensors.channels import VALUE, rate_unit, require_rate
-from floatframe.results.sensors.linear_columns import scalar_columns
 from floatframe.results.sensors.measurement import Measurement, unit_words
-from floatframe.results.small_motions.rows import LinearColumns
-from floatframe.results.small_motions.small_motions import SmallMotions
 from floatframe.results.trajectory import Trajectory
 
 __all__ = ["JointCoordinate"]
@@ -93,7 +90,7 @@ class JointCoordinate(JointCoordinateName):
                 f"coordinate {self.name!r}: joint {self.joint!r} has no coordinate {self.coordinate!r}"
                 f"{nearest(self.coordinate, list(joint.coordinates))}"
             )
-        w = trajectory.source.read("w")[:, trajectory.head.w0[k] :]
+        w = trajectory.unknowns(range(trajectory.head.w0[k], trajectory.head.w0[k + 1]))
         columns, is_angle = self.columns(system, trajectory, joint, w)
         units = {"value": rate_unit(system.units, is_angle, 0), "rate": rate_unit(system.units, is_angle, 1)}
         units["force"] = unit_words(system.units, "moment" if is_angle else "force")
@@ -108,7 +105,7 @@ class JointCoordinate(JointCoordinateName):
         if isinstance(joint, SlidingJoint):
             return sliding_columns(system, trajectory, joint, ends[1], w), False
         assert own is not None
-        a, b = (end_motion(system, trajectory, end) for end in ends)
+        a, b = (end_motion(system, trajectory, end, joint.name) for end in ends)
         place = RelativePlace(a.axes, b.axes, b.position - a.position)
         slip = b.velocity - a.velocity - cross(a.omega, place.d)
         rate = dot(own.direction(place), own.moves(slip, b.omega - a.omega))
@@ -117,18 +114,6 @@ class JointCoordinate(JointCoordinateName):
             where = f"coordinate {self.joint}.{self.coordinate}"
             value = through_turns(trajectory, where, angle_of(own, *ends), value, rate)
         return {"value": value, "rate": rate, "force": own.force(place, w)}, own.is_angle
-
-    def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return its columns as linear functions of small motions; the force also depends on wrenches."""
-        value = small.joint_coordinate(self.joint, self.coordinate, f"coordinate {self.name!r}")
-        if self.rate is not None:
-            row = (value, value.rate, value.rate.rate)[self.rate]
-            return scalar_columns({VALUE: row}, {VALUE: self.units(small.system.units)})
-        force = force_rows(small, self.joint, self.coordinate)
-        units, columns = dict(self.measure(small.system, small.now).units), {"value": value, "rate": value.rate}
-        if force is None:
-            return LinearColumns(columns, units, {"force": "the force along a line with variable direction"})
-        return scalar_columns(columns | {"force": force}, units)
 
     @property
     def is_angle(self) -> bool:
@@ -148,7 +133,7 @@ def sliding_columns(
     system: System, trajectory: Trajectory, joint: SlidingJoint, marker_b: MarkerData, w: Array
 ) -> dict[str, Array]:
     """Return position and rate along a deformed line; the force is that of the drive, zero for free sliding."""
-    b = end_motion(system, trajectory, marker_b)
+    b = end_motion(system, trajectory, marker_b, joint.name)
     place = sliding_place(system, trajectory, joint, b)
     w = w[:, : joint.size]
     if not joint.motions:

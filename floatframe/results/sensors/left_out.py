@@ -38,8 +38,6 @@ from floatframe.results.recovery import require_same_modes
 from floatframe.results.sensors.body_loads import case_amplitudes, interface_loads
 from floatframe.results.sensors.measurement import Measurement, unit_words
 from floatframe.results.sensors.stresses import flexible_body
-from floatframe.results.small_motions.rows import LinearColumns
-from floatframe.results.small_motions.small_motions import SmallMotions
 from floatframe.results.trajectory import Trajectory
 
 __all__ = ["LeftOutEnergy", "LeftOutEstimate", "LeftOutSensor", "left_out", "left_out_estimates", "share_words"]
@@ -262,11 +260,6 @@ class LeftOutSensor:
         own = found[body.name]
         columns = {"energy": own.energy, "strain": own.strain, "share": own.shares}
         return Measurement(self.name, trajectory.t, columns, self.units(system))
-
-    def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return no column: energies are squares of small motions."""
-        units = self.units(small.system)
-        return LinearColumns({}, units, dict.fromkeys(units, "energies are squares of small motions"))
 
     def units(self, system: System) -> dict[str, str]:
         """Return the units of the columns."""

@@ -14,12 +14,11 @@ from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.newton_equations import linearized
 from floatframe.errors import ModelError
 from floatframe.model.forces import Bushing
-from floatframe.model.joints.rows import MOMENT
 from floatframe.model.rotations import tilde
 from floatframe.model.system import System
 from floatframe.results.joint_coordinates import end_motion
 from floatframe.results.recovery import require_same_modes
-from floatframe.results.sensors.linear_columns import NO_SIZE, load_linear, scalar_columns
+from floatframe.results.sensors.linear_columns import NO_SIZE
 from floatframe.results.sensors.measurement import Measurement, load_columns, unit_words, vector_columns
 from floatframe.results.sensors.stresses import flexible_body
 from floatframe.results.small_motions.rows import LinearColumns
@@ -57,22 +56,9 @@ class ReactionSensor:
         reaction = trajectory.reaction(self.of)
         vectors = reaction.force, reaction.moment
         if self.axes == "marker":
-            A = end_motion(system, trajectory, self.end_a(system)).axes
+            A = end_motion(system, trajectory, self.end_a(system), self.of).axes
             vectors = in_body(A, reaction.force), in_body(A, reaction.moment)
         return Measurement(self.name, trajectory.t, *load_columns(system.units, *vectors))
-
-    def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return force and moment as linear functions of wrenches; in marker axes also of motions."""
-        self.require_connection(list(small.now.connection_names))
-        own, reaction = small.wrench(self.of), small.now.reaction(self.of)
-        rows = [
-            small.by_wrench(slice(own.start + first, own.start + first + 3))
-            if own.stop - own.start >= first + 3
-            else small.by_motion(np.zeros((3, small.n_x)))
-            for first in (0, MOMENT)
-        ]
-        place = small.place(self.end_a(small.system), self.of) if self.axes == "marker" else None
-        return load_linear(small, rows, (reaction.force[0], reaction.moment[0]), place)
 
     def require_connection(self, choices: list[str]) -> None:
         """Raise `ModelError`, with the closest name, if the joint or spring does not exist."""
@@ -109,14 +95,6 @@ class EnergySensor:
         columns = {part: getattr(trajectory.energies, part) for part in ENERGIES}
         return Measurement(self.name, trajectory.t, columns, dict.fromkeys(columns, unit_words(system.units, "energy")))
 
-    def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return no linear column, because energies are of second order."""
-        return LinearColumns(
-            {},
-            dict.fromkeys(ENERGIES, unit_words(small.system.units, "energy")),
-            dict.fromkeys(ENERGIES, "energies are of second order in small motions"),
-        )
-
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
@@ -141,7 +119,10 @@ class MomentumSensor:
         return Measurement(self.name, trajectory.t, linear[0] | angular[0], linear[1] | angular[1])
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return momenta about a state of rest: Σ R m v and Σ R j + r × R m v, where M u = (m v, j, ...)."""
+        """Return momenta about a state of rest: Σ R m v and Σ R j + r × R m v, where M u = (m v, j, ...).
+
+        Motions near by have no records of the kernels, which compute momenta.
+        """
         found = self.measure(small.system, small.now)
         if small.is_turning:
             why = dict.fromkeys(found.columns, "the momentum about a steady rotation: linearise the system at rest")
@@ -186,12 +167,6 @@ class ModeSensor:
         motion, unit = trajectory.body(self.body), unit_words(system.units, "modal")
         columns = {"q": motion.q[:, self.mode - 1], "q_dot": motion.q_dot[:, self.mode - 1]}
         return Measurement(self.name, trajectory.t, columns, {"q": unit, "q_dot": f"{unit}/{system.units.time_symbol}"})
-
-    def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the coordinate and its rate as linear functions of small motions."""
-        self.require_mode(flexible_body(small.system, self.name, self.body).reduced.n_q)
-        row = small.coordinates(self.body)[self.mode - 1]
-        return scalar_columns({"q": row, "q_dot": row.rate}, dict(self.measure(small.system, small.now).units))
 
     def require_mode(self, n_q: int) -> None:
         """Raise `ModelError` unless the body has this mode."""

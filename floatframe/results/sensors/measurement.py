@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import Field, dataclass, replace
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -19,6 +19,8 @@ from floatframe.results.small_motions.small_motions import SmallMotions
 from floatframe.results.trajectory import Trajectory
 
 __all__ = [
+    "AnyOutput",
+    "LinearSensor",
     "Measurement",
     "Sensor",
     "amplitude_unit",
@@ -120,10 +122,8 @@ class Measurement:
         return self.sensor if is_chosen else f"{self.sensor} {column}"
 
 
-class Sensor(Protocol):
-    """A frozen dataclass that measures motions; all of them are in `floatframe.results.sensors.SENSORS`."""
-
-    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+class AnyOutput(Protocol):
+    """What measures motions; its linear outputs are the derivatives of what it measures (`linear_columns`)."""
 
     @property
     def name(self) -> str:
@@ -131,6 +131,17 @@ class Sensor(Protocol):
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return the measurement during a motion of the system."""
+
+
+class Sensor(AnyOutput, Protocol):
+    """A frozen dataclass that measures motions; all of them are in `floatframe.results.sensors.SENSORS`."""
+
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+
+
+@runtime_checkable
+class LinearSensor(AnyOutput, Protocol):
+    """A sensor whose linear outputs differences cannot find."""
 
     def linear(self, small: SmallMotions) -> LinearColumns:
         """Return its columns as linear functions of small motions."""

@@ -21,14 +21,14 @@ from floatframe.model.bodies.marker_shape import MarkerShape, interface_shape, i
 from floatframe.model.bodies.markers import Marker, body_name
 from floatframe.model.checked_values import unit_vector
 from floatframe.model.joints.rows import TWIST, RowCoordinate
-from floatframe.model.rotations import left_jacobian, rotation_log
+from floatframe.model.rotations import rotation_log
 from floatframe.model.system import System
 from floatframe.results.full_turns import through_turns
 from floatframe.results.joint_coordinates import end_motion
-from floatframe.results.place_motion import PlaceMotion, angle_and_rate, angle_and_slope, node_motion, normals_of_axis
-from floatframe.results.sensors.linear_columns import scalar_columns, vector_linear
+from floatframe.results.place_motion import PlaceMotion, angle_and_rate, node_motion, normals_of_axis
+from floatframe.results.sensors.linear_columns import differentiated
 from floatframe.results.sensors.measurement import Measurement, unit_words, vector_columns
-from floatframe.results.small_motions.rows import LinearColumns, Rows
+from floatframe.results.small_motions.rows import LinearColumns
 from floatframe.results.small_motions.small_motions import SmallMotions, SmallPlace
 from floatframe.results.trajectory import Trajectory
 
@@ -187,56 +187,19 @@ class PlaceSensor:
         return Measurement(self.name, trajectory.t, columns, units)
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return x, y, z and size as linear functions of small motions, in axes that rotate with the steady motion."""
-        where = f"sensor {self.name!r}"
-        value = self.measure(small.system, small.now).columns
-        if self.relative_to is None:
-            if self.quantity == "rotation-vector" and small.is_turning:
-                raise ModelError(
-                    f"{where}: a rotation vector relative to the ground grows without limit in a steady rotation and "
-                    "is not linear about it; give relative_to = a body that rotates with the system"
-                )
-            rows = absolute_rows(small_place(small, f"{where}: marker", self.marker), self.quantity)
-        else:
-            place = small_place(small, f"{where}: marker", self.marker)
-            other = small_place(small, f"{where}: relative_to", self.relative_to)
-            rows = relative_rows(place, other, self.quantity)
-        unit = unit_words(small.system.units, PLACE_QUANTITIES[self.quantity])
-        least = ROUNDING_OF_MOTION * (1.0 if self.quantity == "rotation-vector" else small.compiled.length)
-        if self.quantity in ("velocity", "acceleration", "angular-velocity"):
-            least = ROUNDING_OF_MOTION * small.speed_scale ** (2 if self.quantity == "acceleration" else 1)
-        return vector_linear(rows, np.array([value[axis][0] for axis in "xyz"]), unit, least=least)
+        """Return x, y, z and size as linear functions of small motions, in axes that rotate with the steady motion.
 
-
-def absolute_rows(place: SmallPlace, quantity: str) -> Rows:
-    """Return three rows for a quantity of a point, in axes that rotate with the steady motion."""
-    match quantity:
-        case "rotation-vector":
-            return place.rotation.mapped(inverse_left_jacobian(place.axes))
-        case "angular-velocity":
-            return place.omega
-        case "velocity":
-            return place.velocity
-        case "acceleration":
-            return place.acceleration
-    return place.moved
-
-
-def inverse_left_jacobian(A: Array) -> Array:
-    """Return the derivative of a matrix's rotation vector by a small rotation multiplied from the left, (3, 3)."""
-    return np.asarray(np.linalg.inv(left_jacobian(rotation_log(A))), dtype=float)
-
-
-def relative_rows(place: SmallPlace, other: SmallPlace, quantity: str) -> Rows:
-    """Return three rows for a quantity of a point relative to another point that has no relative motion at present."""
-    if quantity in TURNING:
-        back = other.axes.T
-        turn = (place.rotation - other.rotation).mapped(back)
-        return turn.rate if quantity == "angular-velocity" else turn.mapped(inverse_left_jacobian(back @ place.axes))
-    rows = other.in_axes(place.moved - other.moved, place.position - other.position)
-    for _ in range(("position", "velocity", "acceleration").index(quantity)):
-        rows = rows.rate
-    return rows
+        Raises
+        ------
+        ModelError
+            For a rotation vector relative to the ground in a steady rotation, which differences cannot see to grow.
+        """
+        if self.quantity == "rotation-vector" and self.relative_to is None and small.is_turning:
+            raise ModelError(
+                f"sensor {self.name!r}: a rotation vector relative to the ground grows without limit in a steady "
+                "rotation and is not linear about it; give relative_to = a body that rotates with the system"
+            )
+        return differentiated(self.measure, small)
 
 
 def absolute(place: PlaceMotion, quantity: str) -> Array:
@@ -316,15 +279,6 @@ class AngleSensor:
         angle = through_turns(trajectory, f"sensor {self.name!r}", self.counted_angle(system), value, rate)
         return Measurement(self.name, trajectory.t, {"angle": angle}, {"angle": "rad"})
 
-    def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the angle as a linear function of small motions."""
-        a, b = (
-            small_place(small, f"sensor {self.name!r}: {key}", marker)
-            for key, marker in (("marker_a", self.marker_a), ("marker_b", self.marker_b))
-        )
-        _, slope = angle_and_slope(a.axes, b.axes, *normals_of_axis(self.axis))
-        return scalar_columns({"angle": (b.rotation - a.rotation).mapped(slope)}, {"angle": "rad"})
-
     def counted_angle(self, system: System) -> CountedAngle:
         """Return the angle that a run counts through full turns, between undeformed bodies."""
         ends = [
@@ -361,14 +315,6 @@ class DisplacementSensor:
         moved = shape.deformation(trajectory.body(body.name).q)[:, :3]
         columns, units = vector_columns(moved, system.units.length_symbol)
         return Measurement(self.name, trajectory.t, columns, units)
-
-    def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return x, y, z and size as linear functions of small motions."""
-        body, shape = self.shape_of(small.system)
-        q = small.now.body(body.name).q[0]
-        rows = small.coordinates(body.name).mapped(shape.shapes(q)[:3])
-        least = ROUNDING_OF_MOTION * small.compiled.length
-        return vector_linear(rows, shape.deformation(q)[:3], small.system.units.length_symbol, least=least)
 
     def shape_of(self, system: System) -> tuple[FlexibleBody, MarkerShape]:
         """Return the body and the marker of the sensor, in the frame of the body's file."""

@@ -1,6 +1,6 @@
 """Sensors of stress and strain on flexible bodies, from all stress modes of their files, including static modes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,19 +18,14 @@ from floatframe.model.checked_values import array_of_shape, number, unit_vector
 from floatframe.model.system import System
 from floatframe.results.place_motion import largest_von_mises, stress_modes
 from floatframe.results.recovery import require_same_modes
-from floatframe.results.sensors.linear_columns import scalar_columns
+from floatframe.results.sensors.linear_columns import differentiated
 from floatframe.results.sensors.measurement import Measurement
 from floatframe.results.sensors.places import found_at
-from floatframe.results.small_motions.rows import LinearColumns, Rows
+from floatframe.results.small_motions.rows import LinearColumns
 from floatframe.results.small_motions.small_motions import SmallMotions
 from floatframe.results.trajectory import Trajectory
 
 __all__ = ["ElongationSensor", "StrainGauge", "StressSensor", "VonMisesSensor", "address_of"]
-
-UNLOADED = "the von Mises stress of a zero stress has no derivative"
-#: the von Mises stress is the root of sᵀ P s, s = xx, yy, zz, yz, xz, xy; this is the block of P for xx, yy, zz
-MISES = np.array([[1, -0.5, -0.5], [-0.5, 1, -0.5], [-0.5, -0.5, 1]])
-ROUNDING = 1e-12  #: stress, relative to the terms of its sum, below which it is a rounding error
 
 
 def flexible_body(system: System, sensor: str, name: str) -> FlexibleBody:
@@ -97,16 +92,6 @@ def with_position(sensor: "StressSensor | StrainGauge") -> None:
         object.__setattr__(sensor, "position", position)
 
 
-def von_mises_rows(modes: Array, q: Array, coordinates: Rows) -> Rows | None:
-    """Return the derivative of the von Mises stress at stress modes @ q, (6,); None if the stress is zero."""
-    stress = modes @ q
-    value = float(von_mises(stress[None])[0])
-    if value <= ROUNDING * float(np.linalg.norm(modes) * np.linalg.norm(q)):
-        return None
-    by_stress = np.concatenate([MISES @ stress[:3], 3 * stress[3:]]) / value
-    return coordinates.mapped(by_stress @ modes)
-
-
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 @checked_fields(ModelError)
@@ -154,11 +139,19 @@ class StressSensor:
         body = flexible_body(system, self.name, self.body)
         require_same_modes(trajectory, self.body, body.reduced)
         modes, places = self.modes_of(body, trajectory)
+        return replace(self.measured_at(modes, system, trajectory), places=places)
+
+    def measured_at(self, modes: Array, system: System, trajectory: Trajectory) -> Measurement:
+        """Return the stress components and the von Mises stress over time at the point of these stress modes."""
         stress = stress_of(modes[None], trajectory.body(self.body).q)[0].T
         columns = {component: stress[:, k] for k, component in enumerate(STRESS_COMPONENTS)}
         columns["von Mises"] = von_mises(stress)
-        units = dict.fromkeys(columns, system.units.stress_symbol)
-        return Measurement(self.name, trajectory.t, columns, units, places)
+        return Measurement(self.name, trajectory.t, columns, dict.fromkeys(columns, system.units.stress_symbol))
+
+    def linear(self, small: SmallMotions) -> LinearColumns:
+        """Return the derivatives at the point that is chosen now; motions near by may choose another one."""
+        modes, _ = self.modes_of(flexible_body(small.system, self.name, self.body), small.now)
+        return differentiated(lambda *given: self.measured_at(modes, *given), small)
 
     def modes_of(self, body: FlexibleBody, trajectory: Trajectory) -> tuple[Array, tuple[str, ...]]:
         """Return stress modes, (6, n_q), and description of the point; for several points, of the most stressed one."""
@@ -172,18 +165,6 @@ class StressSensor:
             largest, where = largest_von_mises(trajectory, self.body, body.reduced, rows=found.rows)
             row = int(where[int(largest.argmax())])
         return np.asarray(modes[row]), (f"{found.description()}; measured at node {body.reduced.node_name(row)}",)
-
-    def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return stress components, and the von Mises stress unless it is zero, as functions of small motions."""
-        body = flexible_body(small.system, self.name, self.body)
-        (modes, _), q = self.modes_of(body, small.now), small.coordinates(self.body)
-        rows = q.mapped(modes)
-        columns = {component: rows[k] for k, component in enumerate(STRESS_COMPONENTS)}
-        units = dict.fromkeys((*columns, "von Mises"), small.system.units.stress_symbol)
-        sum_of_all = von_mises_rows(modes, small.now.body(self.body).q[0], q)
-        if sum_of_all is None:
-            return LinearColumns(columns, units, {"von Mises": UNLOADED})
-        return scalar_columns(columns | {"von Mises": sum_of_all}, units)
 
 
 @frozen_copies
@@ -243,18 +224,19 @@ class VonMisesSensor:
         return Measurement(self.name, trajectory.t, columns, units, (*place, *words), numbers)
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the von Mises stress as a linear function of small motions, at the node where it is largest now."""
-        body = flexible_body(small.system, self.name, self.body)
-        units = dict(self.measure(small.system, small.now).units)
-        address = address_of(self)
+        """Return the derivative at the node where the stress is largest now; motions near by may have another one."""
+        now = self.measure(small.system, small.now)
+        body, address = flexible_body(small.system, self.name, self.body), address_of(self)
         rows = None if address is None else found_at(body, f"sensor {self.name!r}", address, of_stress=True).rows
         _, where = largest_von_mises(small.now, self.body, body.reduced, rows=rows)
-        modes = np.asarray(stress_modes(self.body, body.reduced)[int(where[0])])
-        row = von_mises_rows(modes, small.now.body(self.body).q[0], small.coordinates(self.body))
-        not_linear = {column: "numbers of nodes have no derivative" for column in units if column != "largest"}
-        if row is None:
-            return LinearColumns({}, units, not_linear | {"largest": UNLOADED})
-        return LinearColumns({"largest": row}, units, not_linear)
+        modes = stress_modes(self.body, body.reduced)[where[:1]]
+
+        def measured(_: System, trajectory: Trajectory) -> Measurement:
+            stress = stress_of(modes, trajectory.body(self.body).q)[0].T
+            numbers = {name: np.repeat(now.columns[name], len(stress)) for name in now.numbers}
+            return replace(now, t=trajectory.t, columns={"largest": von_mises(stress)} | numbers)
+
+        return differentiated(measured, small)
 
 
 def node_words(reduced: ReducedBody, row: int) -> str:
@@ -325,12 +307,6 @@ class StrainGauge:
         along = np.array([x * x, y * y, z * z, 2 * y * z, 2 * x * z, 2 * x * y]) @ modes
         return np.asarray(((1 + self.poisson) * along - self.poisson * modes[:3].sum(axis=0)) / self.young)
 
-    def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the strain as a linear function of small motions."""
-        body = flexible_body(small.system, self.name, self.body)
-        row = small.coordinates(self.body).mapped(self.strain_modes(body))
-        return scalar_columns({"strain": row}, {"strain": "-"})
-
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
@@ -399,10 +375,3 @@ class ElongationSensor:
             )
         by_q = np.asarray(reduced.Phi[b].mean(axis=0) - reduced.Phi[a].mean(axis=0))
         return np.asarray(reduced.nodes[b].mean(axis=0) - reduced.nodes[a].mean(axis=0)), by_q
-
-    def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the strain as a linear function of small motions."""
-        body = flexible_body(small.system, self.name, self.body)
-        d, by_q = self.line(body)
-        row = small.coordinates(self.body).mapped(d @ by_q / (d @ d))
-        return scalar_columns({"strain": row}, {"strain": "-"})

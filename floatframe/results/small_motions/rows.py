@@ -48,6 +48,16 @@ class Rows:
         return Rows(A @ self.x, A @ self.v, A @ self.a, A @ self.w)
 
     @property
+    def size(self) -> "Rows":
+        """The magnitude of each coefficient."""
+        return Rows(abs(self.x), abs(self.v), abs(self.a), abs(self.w))
+
+    def without(self, least: "Rows") -> "Rows":
+        """Return the rows with zero in place of coefficients below a magnitude, which are rounding errors."""
+        pairs = ((getattr(self, name), getattr(least, name)) for name in ("x", "v", "a", "w"))
+        return Rows(*(np.where(abs(own) <= bound, 0.0, own) for own, bound in pairs))
+
+    @property
     def rate(self) -> "Rows":
         """The rows of the rate y', which exist only for rows without second rates."""
         assert not self.a.any()  # small motions have no third rates

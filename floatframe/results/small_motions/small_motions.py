@@ -191,18 +191,13 @@ class SmallMotions:
         rows, R = self.of_file(name)
         return SmallPlace(self.now.body(name).r[0], R, rows[:3].mapped(R), rows[3:6].mapped(R), self.omega)
 
-    def joint_coordinate(self, joint: str, coordinate: str, where: str) -> Rows:
-        """Return one row with the change of a joint coordinate; `ModelError` with the closest name if missing."""
+    def joint_coordinate(self, joint: str, coordinate: str, where: str) -> Array:
+        """Return the derivative of a joint coordinate by body motions, (n_u,); `ModelError` if it is missing."""
         rows = coordinate_rows(self.system, self.compiled, self.work, self.state)
         name = f"{joint}.{coordinate}"
         if name not in rows:
             raise ModelError(f"{where}: no joint coordinate {quoted(name)}{nearest(name, list(rows))}")
-        x = np.zeros(self.n_x)
-        x[: self.n_u] = rows[name]
-        for k, base in enumerate(self.bases):
-            if joint in base.moved:  # a common motion of both sides does not change it
-                x[self.n_u + k] = -rows[name] @ self.rigid(base)
-        return self.by_motion(x)
+        return rows[name]
 
     def rigid(self, base: BaseColumn) -> Array:
         """Return the small motions of all bodies, (n_u,), that move rigidly together with a base."""

@@ -147,7 +147,7 @@ def test_resonances_are_met_by_their_frequencies():
         ),
         (
             lambda: linearize(oscillator(), outputs=[JointCoordinate("pin", "angle", "c", rate=0)]),
-            "no joint coordinate 'pin.angle'",
+            "no joint 'pin' in the motion",
         ),
         (lambda: Channel("c", Marker("mass"), rate=3), "rate: expected 0, 1 or 2"),
         (lambda: StressChannel("s", "b", "vm", (0, 0, 0)), "component: expected one of xx"),

@@ -5,19 +5,35 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from numba import njit
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
-from floatframe import JointForce, Marker, PointForce, UserForce, linearize, static_equilibrium
+from floatframe import (
+    GROUND,
+    Gravity,
+    JointForce,
+    Marker,
+    PointForce,
+    RigidBody,
+    SpringDamper,
+    System,
+    UserForce,
+    linearize,
+    static_equilibrium,
+)
 from floatframe.analyses import ParameterInput, campbell, steady_rotation
 from floatframe.errors import ModelError
 from floatframe.joints import JointCoordinate
 from floatframe.model.elements import Element, ElementLaw
+from floatframe.results.sensors.measurement import Measurement
 from floatframe.results.sensors.places import PLACE_QUANTITIES, TURNING
+from floatframe.results.small_motions.nearby import derivatives
 from floatframe.sensors import (
     AngleSensor,
+    BushingSensor,
     Channel,
     DisplacementSensor,
     ElementSensor,
+    EnergySensor,
     InterfaceForceSensor,
     PlaceSensor,
     ReactionSensor,
@@ -25,6 +41,7 @@ from floatframe.sensors import (
     StressSensor,
     VonMisesSensor,
 )
+from tests.floatframe.analyses.examples import TURN as ANY_AXES
 from tests.floatframe.analyses.examples import (
     assert_slopes,
     compare,
@@ -109,6 +126,99 @@ def test_an_element_shows_absolute_rates_about_a_steady_rotation(marker):
     system = replace(rotor(), elements=[ShownMotion("shown", marker)])
     about, seen = steady_rotation(system, (0, 0, 2.0), tolerance=1e-12), [ElementSensor("seen", "shown")]
     compare(system, about, linearize(system, about, outputs=seen), seen, size=4e-6, tolerance=2e-6)
+
+
+@dataclass(frozen=True, eq=False)
+class Taut:
+    """A sensor of another package: distance of two markers, power of a spring on the first, and more of them."""
+
+    name: str
+    marker: Marker
+    other: Marker
+    spring: str
+
+    def measure(self, system, trajectory):
+        def seen(quantity, marker=self.marker):
+            found = PlaceSensor("", marker, quantity).measure(system, trajectory)
+            return np.column_stack([found.x, found.y, found.z])
+
+        d = seen("position") - seen("position", self.other)
+        force = trajectory.reaction(self.spring).force
+        columns = {
+            "distance": np.linalg.norm(d, axis=1),
+            "power": np.sum(force * seen("velocity"), axis=1),
+            "twist": np.sin(np.sum(d * seen("angular-velocity"), axis=1)),
+            "pull": np.sum(seen("acceleration") * d, axis=1) / np.sum(d**2, axis=1),
+            "gap": np.abs(np.sum(d**2, axis=1) - np.sum(d[0] ** 2)),
+            "count": np.floor(d[:, 0]),
+        }
+        return Measurement(self.name, trajectory.t, columns, dict.fromkeys(columns, "-"), numbers=("count",))
+
+
+BALL = Marker("ball", position=(0.1, 0.2, 0.3), triad=ANY_AXES)
+TILTED = [
+    *(PlaceSensor(f"{what} ball", BALL, what) for what in PLACE_QUANTITIES if what != "rotation-vector"),
+    *(PlaceSensor(f"{what} of pin", Marker("pin", position=(0.3, 0, 0.1)), what, BALL) for what in PLACE_QUANTITIES),
+    *(PlaceSensor(f"{what} of ball", BALL, what, Marker("blade", "end_a")) for what in PLACE_QUANTITIES),
+    AngleSensor("angle", Marker("blade", "end_a"), BALL, axis=(0.6, 0, 0.8)),
+    BushingSensor("cage", "cage"),
+    BushingSensor("root", "root"),
+    ReactionSensor("cage there", "cage", "marker"),
+    Taut("taut", BALL, Marker("blade", "end_a"), "tie"),
+]
+
+
+def test_what_tilts_in_a_steady_rotation_is_seen_by_every_sensor():
+    """The ball tilts about axes across Omega, and is bent away from its place: Omega × theta moves what it shows."""
+    system = rotor()
+    about = steady_rotation(system, (0, 0, 2.0), tolerance=1e-12)
+    linear = linearize(system, about, outputs=TILTED)
+    assert {"taut.distance", "taut.power", "taut.twist", "taut.pull"} < set(linear.outputs)
+    assert set(linear.left_out) >= {"taut.gap", "taut.count"}
+    compare(system, about, linear, TILTED, size=4e-6, tolerance=2e-6)
+
+
+def test_a_sensor_of_another_package_is_linearised_by_what_it_measures(rest):
+    system, about, _ = rest
+    sensor = [Taut("taut", Marker("block", position=(0.1, 0.2, 0.3)), Marker("arm", "end_a"), "stay")]
+    compare(system, about, linearize(system, about, outputs=sensor), sensor)
+
+
+def test_a_sensor_that_reads_energies_is_not_linear_and_says_why(rest):
+    system, about, _ = rest
+    linear = linearize(system, about, outputs=[EnergySensor("energy")])
+    assert linear.left_out["energy.total"] == "small motions do not determine energies and momenta"
+
+
+def test_a_spring_far_from_the_origin_has_the_same_derivatives():
+    """Its length is the difference of positions of 1e4: the step has to outweigh their rounding."""
+    found = []
+    for place in (0.0, 1e4):
+        mass = RigidBody("mass", 1.0, np.eye(3), position=(place + 0.3, 0.4, 0.1))
+        spring = SpringDamper("spring", Marker(GROUND, position=(place, 0, 0)), "mass", 40.0, 0.3)
+        system = System([mass], forces=[spring, Gravity((0, 0, -9.81))])
+        about = static_equilibrium(system, tolerance=1e-10)
+        linear = linearize(system, about, outputs=[SpringSensor("spring", "spring")])
+        found.append(np.linalg.norm(linear.L[:2], axis=1))
+    assert_allclose(found[1], found[0], rtol=1e-8, atol=1e-8)
+    assert found[0][0] > 0.5
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-3, 1e-6, 1e-9])
+def test_derivatives_of_a_short_vector_are_found_and_of_none_refused(size):
+    """The magnitude of (size, 0) has the slopes 1 and 0; that of (0, 0) has none, nor has |x|."""
+
+    def columns(k, h):
+        x = np.zeros((1 + len(k), 2))
+        x[np.arange(1, 1 + len(k)), k] = h
+        return np.column_stack([
+            np.hypot(size + x[:, 0], x[:, 1]), np.hypot(x[:, 0], x[:, 1]), np.exp(x[:, 0]) + x[:, 1] ** 3,
+            abs(x[:, 1]) + x[:, 0], np.where(abs(x[:, 0]) < 1e-4, 3 * x[:, 0], np.nan),
+        ])  # fmt: skip
+
+    slopes, is_smooth = derivatives(columns, np.array([1.0, 2.0]), 5)
+    assert_array_equal(is_smooth, [True, False, True, False, True])
+    assert_allclose(slopes[[0, 2, 4]], [[1, 0], [1, 0], [3, 0]], rtol=1e-9, atol=1e-9)
 
 
 INPUTS = {
