@@ -17,6 +17,8 @@ D and J include them. Most of the cost is one pass over S_ab (9 n² numbers), on
 K_r (6 n²).
 """
 
+from typing import NamedTuple
+
 from floatframe.engine.kernels.compiler.compilation import loops, small, view
 from floatframe.engine.kernels.dense import add_products, flat, matrix_at, rows_of
 from floatframe.engine.kernels.model import C1, C2, C3, C4, DAMPING, K_ROTATION, K_TRANSLATION, MASS, S_AB, STIFFNESS
@@ -48,6 +50,7 @@ from floatframe.engine.kernels.vector import (
 )
 
 __all__ = [
+    "Weights",
     "body_forces",
     "body_mass_product",
     "body_tangent",
@@ -63,6 +66,14 @@ __all__ = [
     "newton_block",
     "shape_moments",
 ]
+
+
+class Weights(NamedTuple):
+    """Weights of a Newton matrix: changes of accelerations, velocities and positions by its unknowns."""
+
+    c_m: float  #: of the mass
+    c_d: float  #: of the damping
+    c_k: float  #: of the stiffness
 
 
 @view
@@ -291,8 +302,8 @@ def gyroscopic(omega, J, D):
 
 
 @loops
-def body_tangent(model, work, i, c_m, c_d, c_k, H, turn):
-    """Write the derivative of (1) to (3) into H, (6 + n, 6 + n); c_m, c_d, c_k: weights of mass, damping, stiffness.
+def body_tangent(model, work, i, weights, H, turn):
+    """Write the derivative of (1) to (3) into H, (6 + n, 6 + n).
 
     Columns are (dx, dtheta, dq) with da = c_m dx, dalpha = c_m dtheta, dq_ddot = c_m dq, domega = c_d dtheta,
     dq_dot = c_d dq, and c_k times the derivatives by q. The derivative by the rotation of the body (da = a × dphi) is
@@ -302,6 +313,7 @@ def body_tangent(model, work, i, c_m, c_d, c_k, H, turn):
         d(1) = m da - tilde(s) dalpha - (2 tilde(v) + tilde(omega × s) + tilde(omega) tilde(s)) domega + ...
         d(2) = tilde(s) da + J dalpha + (2 Σ q_dot_k D_k + tilde(omega) J - tilde(J omega)) domega + ...
     """
+    c_m, c_d, _ = weights
     bodies, n, q0, u0 = work.bodies, model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
     m, a, s, J = model.body_types.mass[model.bodies.kind[i]], vector(bodies.a_B[i]), vector(bodies.s[i]), bodies.J[i]
     omega, q_dot = vector(work.state.u[u0 + 3 :]), work.state.u[u0 + 6 : u0 + 6 + n]
@@ -316,7 +328,7 @@ def body_tangent(model, work, i, c_m, c_d, c_k, H, turn):
     put_block(turn, 0, 0, tilde(scaled(m, a)))
     put_block(turn, 3, 0, product(tilde(s), tilde(a)))
     if n > 0:
-        modal_tangent(model, work, i, c_m, c_d, c_k, H, turn)
+        modal_tangent(model, work, i, weights, H, turn)
     if work.state.spins[i] != 0:
         spin_columns(model, work, i, c_d, H)
 
@@ -341,12 +353,13 @@ def spin_columns(model, work, i, c_d, H):
 
 
 @loops
-def modal_tangent(model, work, i, c_m, c_d, c_k, H, turn):
+def modal_tangent(model, work, i, weights, H, turn):
     """Write the rows and columns of the modes into H; see `body_tangent`.
 
     These are the derivatives of (1) by q, of (2) by q without the sums over modes (see `modal_columns`), and of (3) by
     a, alpha, omega. In the code b = 1C_k.
     """
+    c_m, c_d, c_k = weights
     types, bodies = model.body_types, work.bodies
     t, n, q0, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
     W, Y, first = rows_of(bodies.W, 9, q0, n), rows_of(bodies.Y, 3, q0, n), rows_of(bodies.C1, 3, q0, n)

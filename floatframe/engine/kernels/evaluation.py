@@ -93,14 +93,15 @@ def body_load(model, work, d):
 
 
 @inner
-def tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning):
+def tangent_of_body(model, work, i, weights, H, turning):
     """Write the tangent of body i into H, (6 + n, 6 + n); each wrench is constant in ground axes or marker axes.
 
     turning, (3, 3): rotation of the body by its unknown dtheta, see `marker_columns`.
     """
+    _, _, c_k = weights
     n = model.bodies.n_q[i]
     turn = work.bodies.by_turn[model.bodies.u0[i] : model.bodies.u0[i + 1]]
-    body_tangent(model, work, i, c_m, c_d, c_k, H, turn)
+    body_tangent(model, work, i, weights, H, turn)
     for e in range(model.bodies.end0[i], model.bodies.end0[i + 1]):
         marker_stiffness(model, work, model.bodies.ends[e], c_k, H, turn)
     for e in range(model.bodies.load0[i], model.bodies.load0[i + 1]):
@@ -124,20 +125,21 @@ def turning_by_unknown(model, work, i):
 
 
 @inner
-def linearize(model, work, c_m, c_d, c_k):
+def linearize(model, work, weights):
     """Write H of every body, J_row and J_column of every end, P and V of every connection, without factorisation."""
     for i in range(model.bodies.kind.shape[0]):
-        linearize_body(model, work, i, c_m, c_d, c_k)
+        linearize_body(model, work, i, weights)
     for c in range(model.connections.size.shape[0]):
-        connection_derivatives(model, work, c, c_k)
+        connection_derivatives(model, work, c, weights.c_k)
 
 
 @inner
-def linearize_body(model, work, i, c_m, c_d, c_k):
+def linearize_body(model, work, i, weights):
     """Write H of body i, and J_row and J_column of its ends, without factorisation."""
+    _, c_d, c_k = weights
     n, rate, turning = 6 + model.bodies.n_q[i], c_d / c_k if c_k > 0.0 else 0.0, work.bodies.T_right[i]
     put_matrix(turning, turning_by_unknown(model, work, i))
-    tangent_of_body(model, work, i, c_m, c_d, c_k, newton_block(model, work, i), turning)
+    tangent_of_body(model, work, i, weights, newton_block(model, work, i), turning)
     for e in range(model.bodies.end0[i], model.bodies.end0[i + 1]):
         m = model.bodies.ends[e]
         o = model.markers.x0[m]
@@ -147,4 +149,4 @@ def linearize_body(model, work, i, c_m, c_d, c_k):
         if model.markers.accelerated[m] >= 0:
             o = model.markers.a0[m]
             row_a = rows_of(work.solver.J_a, 6, o, n)
-            acceleration_columns(model, work, m, c_m, c_d, c_k, turning, row_a)
+            acceleration_columns(model, work, m, weights, turning, row_a)

@@ -5,7 +5,7 @@ Described in `floatframe.integrators.generalized_alpha`.
 
 import math
 
-from floatframe.engine.kernels.body import body_mass_product, modal_number, modal_term
+from floatframe.engine.kernels.body import Weights, body_mass_product, modal_number, modal_term
 from floatframe.engine.kernels.compiler.compilation import inner, small
 from floatframe.engine.kernels.connections.gap import next_step, step_before_contact, take_ends
 from floatframe.engine.kernels.connections.user_force import resize_states
@@ -521,8 +521,8 @@ def mean_square(model, work, i, jump):
 
 @inner
 def newton_weights(order, h):
-    """Return c_m, c_d, c_k: the derivatives of u_dot, u and x by the algorithmic acceleration a."""
-    return (1 - order.alpha_m) / (1 - order.alpha_f), order.gamma * h, order.beta * h * h
+    """Return the derivatives of u_dot, u and x by the algorithmic acceleration a."""
+    return Weights((1 - order.alpha_m) / (1 - order.alpha_f), order.gamma * h, order.beta * h * h)
 
 
 @inner
@@ -532,7 +532,8 @@ def one_step(model, work, memory, order, h):
     Return (status, index of the singular body or connection, last correction divided by the allowed one, error or -1 if
     it is not estimated).
     """
-    c_m, c_d, c_k = newton_weights(order, h)
+    weights = newton_weights(order, h)
+    c_m, c_d, c_k = weights
     size, size_x = predict(model, work, memory, h, order)
     wanted = wanted_correction(model, order, c_k, size, size_x)
     allowed = wanted + roundoff_floor(model, work.state.r, order.length)
@@ -555,14 +556,14 @@ def one_step(model, work, memory, order, h):
             if body >= 0:
                 return TURNED, body, excess, -1.0
         if work.solver.is_due == 1:
-            body = factorize_bodies(model, work, c_m, c_d, c_k)
+            body = factorize_bodies(model, work, weights)
             if body >= 0:
                 return SINGULAR_BODY, body, excess, -1.0
             solver.c_m, solver.c_d, solver.c_k = c_m, c_d, c_k
             work.solver.is_due, solver.n_steps, solver.n_spent, solver.contraction = 0, 0, solver.price, -1.0
             is_new = True
         elif iteration == 0:
-            body = renew_turning(model, work, c_m, c_d, c_k)
+            body = renew_turning(model, work, weights)
             if body >= 0:
                 work.solver.is_due = 1
                 return SINGULAR_BODY, body, excess, -1.0

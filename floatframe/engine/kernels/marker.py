@@ -207,7 +207,7 @@ def marker_acceleration(model, work, m, out):
 
 
 @loops
-def acceleration_columns(model, work, m, c_m, c_d, c_k, turning, row):
+def acceleration_columns(model, work, m, weights, turning, row):
     """Write c_k times the derivatives of marker m's acceleration by the unknowns of a step, body axes.
 
     They are written into row, (6, 6 + n). In a step, accelerations change by c_m/c_k and velocities by c_d/c_k times
@@ -219,6 +219,7 @@ def acceleration_columns(model, work, m, c_m, c_d, c_k, turning, row):
 
     In alpha, the derivatives of T' and its rate by q and q_dot are omitted: they are of the size of elastic rotations.
     """
+    c_m, c_d, c_k = weights
     i = model.markers.body[m]
     n, u0, omega = model.bodies.n_q[i], model.bodies.u0[i], body_omega(model.bodies, work.state, i)
     R, rho, rho_dot = work.state.R[i], vector(work.markers.rho[m]), vector(work.markers.rho_dot[m])

@@ -9,7 +9,7 @@ and Z do not rotate with the body, so that they can be used for many steps; P, R
 
 import math
 
-from floatframe.engine.kernels.body import modal_number, newton_block
+from floatframe.engine.kernels.body import Weights, modal_number, newton_block
 from floatframe.engine.kernels.compiler.compilation import inner, loops, small, view
 from floatframe.engine.kernels.connections.connection import (
     connection_derivatives,
@@ -53,9 +53,9 @@ SWEEPS = 5  # number of iterations: with soft 1e-9 of A, constraints with a cond
 
 
 @inner
-def factorize_bodies(model, work, c_m, c_d, c_k):
+def factorize_bodies(model, work, weights):
     """Linearise at the iterate, factorise H of each body, write X, Z; return the body with singular H, or -1."""
-    linearize(model, work, c_m, c_d, c_k)
+    linearize(model, work, weights)
     return factorize_tangents(model, work)
 
 
@@ -97,12 +97,12 @@ def factorize_body(model, work, i):
 
 
 @inner
-def renew_turning(model, work, c_m, c_d, c_k):
+def renew_turning(model, work, weights):
     """Linearise and factorise the rigid bodies that rotate by more than `TURNING` in the step."""
     for i in range(model.bodies.kind.shape[0]):
         theta = vector(work.state.theta[i])
         if model.bodies.n_q[i] == 0 and dot(theta, theta) > TURNING * TURNING:
-            linearize_body(model, work, i, c_m, c_d, c_k)
+            linearize_body(model, work, i, weights)
             if not factorize_body(model, work, i):
                 return i
     return -1
@@ -428,7 +428,7 @@ def assemble_masses(model, work, c_k):
     Modes without mass get c_k times their stiffness as mass.
     """
     bodies, types = model.bodies, model.body_types
-    linearize(model, work, 1.0, 0.0, 0.0)
+    linearize(model, work, Weights(1.0, 0.0, 0.0))
     for i in range(bodies.kind.shape[0]):
         n, t = 6 + bodies.n_q[i], bodies.kind[i]
         H = newton_block(model, work, i)

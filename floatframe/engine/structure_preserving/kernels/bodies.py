@@ -115,9 +115,9 @@ class ModalMotion(NamedTuple):
 
 
 @loops
-def inertia_force(types, discrete, step, t, n, start, end, q_mean, C_mean, out):
+def inertia_force(types, discrete, step, t, start, end, q_mean, C_mean, out):
     """Write N_k, (n,), the modal inertia force 1/2 w_0ᵀ M_c,k w_1 between two motions."""
-    (q_0, omega_0, rate_0), (q_1, omega_1, rate_1) = start, end
+    (q_0, omega_0, rate_0), (q_1, omega_1, rate_1), n = start, end, q_mean.shape[0]
     m, C = types.mass[t], matrix_at(step.C, 0, 3, n)
     V, W = matrix_at(step.V, 0, 9, n), matrix_at(step.W, 0, 9, n)
     constant_products(types, t, S_AB, q_mean, V)
@@ -310,7 +310,7 @@ def body_inertia(model, discrete, step, i):
     q_mean = step.q_mean[q0 : q0 + n]
     start = ModalMotion(step.q_0[q0 : q0 + n], vector(step.w_0[u0 + 3 :]), step.w_0[u0 + 6 : u0 + 6 + n])
     end = ModalMotion(step.q_1[q0 : q0 + n], vector(step.w_1[u0 + 3 :]), step.w_1[u0 + 6 : u0 + 6 + n])
-    inertia_force(model.body_types, discrete, step, t, n, start, end, q_mean, C_mean, N)
+    inertia_force(model.body_types, discrete, step, t, start, end, q_mean, C_mean, N)
     subtract_elastic(model.body_types, discrete, step, t, n, q_mean, step.dq[q0 : q0 + n], N)
     for k in range(n):
         out[u0 + 6 + k] = 0.5 * h * (step.P_1[u0 + 6 + k] - step.P_0[u0 + 6 + k]) - 0.5 * h * h * N[k]
@@ -344,5 +344,5 @@ def interval(model, discrete, step, i):
         C = matrix_at(step.C_interval, 0, 3, n)
         center(model.body_types, t, n, q, C)
         middle = ModalMotion(q, omega, rate)
-        inertia_force(model.body_types, discrete, step, t, n, middle, middle, q, C, step.force)
+        inertia_force(model.body_types, discrete, step, t, middle, middle, q, C, step.force)
         subtract_elastic(model.body_types, discrete, step, t, n, q, step.dq[q0 : q0 + n], step.force)

@@ -13,6 +13,7 @@ correction of the unknown. The unknown of a group of rotations is the vector x w
 theta = T(x) dx, and the rates z_dot, z_ddot, in axes of B, change by d(z_dot) = theta_dot + z_dot × theta.
 """
 
+from floatframe.engine.kernels.body import Weights
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.vector import add, cross, put, scaled, sub, turned, vector
 from floatframe.engine.tree.kernels.kinematics import end_motion, joint_ends
@@ -48,18 +49,19 @@ def put_reach(out, S_0, S_1, V):
 
 
 @inner
-def write_jets(model, work, tree, joints, tangent, c_m, c_d, c_k, rate):
+def write_jets(model, work, tree, joints, tangent, weights, rate):
     """Write screws, jets with weights c_m, c_d, c_k, and reaches with weights 1 and `rate`, of all joints."""
     put(tangent.origin, 0, vector(work.state.r[tree.order[0]]))
     for i in range(tree.parent.shape[0]):
-        column_jets(model, work, tree, joints, tangent, i, c_m, c_d, c_k, rate)
-        mode_jets(model, work, tree, tangent, i, NEAR_MODE, tree.near[i], 1.0, c_m, c_d, c_k, rate)
-        mode_jets(model, work, tree, tangent, i, FAR_MODE, tree.far[i], -1.0, c_m, c_d, c_k, rate)
+        column_jets(model, work, tree, joints, tangent, i, weights, rate)
+        mode_jets(model, work, tree, tangent, i, NEAR_MODE, weights, rate)
+        mode_jets(model, work, tree, tangent, i, FAR_MODE, weights, rate)
 
 
 @inner
-def mode_jets(model, work, tree, tangent, i, kind, m, sign, c_m, c_d, c_k, rate):
-    """Write screws, jets and reaches of the modes of body i at marker m of its joint."""
+def mode_jets(model, work, tree, tangent, i, kind, weights, rate):
+    """Write screws, jets and reaches of the modes at the near or far marker of body i's joint."""
+    m, sign = (tree.near[i], 1.0) if kind == NEAR_MODE else (tree.far[i], -1.0)
     if m < 0 or model.markers.psi0[m] < 0:
         return
     body = model.markers.body[m]
@@ -70,7 +72,7 @@ def mode_jets(model, work, tree, tangent, i, kind, m, sign, c_m, c_d, c_k, rate)
         s, s_1, s_2 = mode_screws(model, work, m, body, tree.jet_item[j], held)
         S, S_1, S_2 = scaled_pair(sign, s), scaled_pair(sign, s_1), scaled_pair(sign, s_2)
         put_pair_of(tangent.screw[j], 0, S)
-        put_mode_jet(tangent.jet[j], S, S_1, S_2, held, c_m, c_d, c_k)
+        put_mode_jet(tangent.jet[j], S, S_1, S_2, held, weights)
         put_reach(tangent.reach[j], S, pair_sum(scaled_pair(rate, S), S_1), held[2])
 
 
@@ -92,16 +94,18 @@ def carrier(model, work, tangent, m, i):
 
 
 @inner
-def put_mode_jet(out, S, S_1, S_2, held, c_m, c_d, c_k):
+def put_mode_jet(out, S, S_1, S_2, held, weights):
     """Write the jet of a mode from the screws that `mode_screws` returns."""
+    c_m, c_d, c_k = weights
     by_rate = pair_sum(scaled_pair(c_d, S), scaled_pair(c_k, S_1))
     by_second = pair_sum(scaled_pair(c_m, S), pair_sum(scaled_pair(2 * c_d, S_1), scaled_pair(c_k, S_2)))
     put_jets(out, scaled_pair(c_k, S), by_rate, by_second, held[2], held[3])
 
 
 @inner
-def column_jets(model, work, tree, joints, tangent, i, c_m, c_d, c_k, rate):
+def column_jets(model, work, tree, joints, tangent, i, weights, rate):
     """Write screws, jets and reaches of the joint columns of body i."""
+    c_m, c_d, c_k = weights
     if tree.column0[i] == tree.column0[i + 1]:
         return
     origin, zero = vector(tangent.origin), (0.0, 0.0, 0.0)
@@ -133,11 +137,11 @@ def column_jets(model, work, tree, joints, tangent, i, c_m, c_d, c_k, rate):
             th_1 = sub(scaled(c_d, alpha), scaled(c_k, cross(spin, theta)))
             th_2 = sub(sub(scaled(c_m, alpha), scaled(c_k, cross(spin_dot, theta))), cross(spin, th_1))
             if joints.spins[i] != 0:
-                th_1, th_2 = spin_variations(tree, joints, i, alpha, theta, c_m, c_d, c_k)
+                th_1, th_2 = spin_variations(tree, joints, i, alpha, theta, weights)
             S_0 = world_screw(A_b, p_b, (zero, scaled(c_k, theta)))
             S_1, S_2 = world_screw(A_b, p_b, (zero, th_1)), world_screw(A_b, p_b, (zero, th_2))
             put_jets(jet, S_0, S_1, S_2, V_b, V_b_dot)
             th_1 = sub(scaled(rate, alpha), cross(spin, theta))
             if joints.spins[i] != 0:
-                th_1, _ = spin_variations(tree, joints, i, alpha, theta, 0.0, rate, 1.0)
+                th_1, _ = spin_variations(tree, joints, i, alpha, theta, Weights(0.0, rate, 1.0))
             put_reach(reach, world_screw(A_b, p_b, (zero, theta)), world_screw(A_b, p_b, (zero, th_1)), V_b)

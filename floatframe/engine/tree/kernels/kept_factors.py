@@ -50,13 +50,13 @@ __all__ = ["factorize_poses", "keep_bodies", "solve_kept"]
 
 
 @inner
-def keep_bodies(model, work, tree, c_m, c_d, c_k):
+def keep_bodies(model, work, tree, weights):
     """Write the reused body matrices; call after `evaluate_tree`."""
     for i in range(tree.parent.shape[0]):
         turning = work.bodies.T_right[i]
         put_matrix(turning, scaled_matrix(0.0, unit_matrix()))
         H = newton_block(model, work, i)
-        tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning)
+        tangent_of_body(model, work, i, weights, H, turning)
         symmetrise(H)
 
 

@@ -138,12 +138,13 @@ def place_body(model, work, tree, joints, i):
     moved = add(cross(omega_a, D), s)
     bent = add(cross(alpha_far if is_reversed else alpha, D), add(cross(omega_a, add(moved, s)), s_dot))
     r, v, a = add(r, scaled(sense, D)), add(v, scaled(sense, moved)), add(a, scaled(sense, bent))
-    put_body(model, work, tree, i, r, A_far, v, omega_far, a, alpha_far)
+    put_body(model, work, tree, i, (r, A_far, v, omega_far, a, alpha_far))
 
 
 @loops
-def put_body(model, work, tree, i, r, A, v, omega, a, alpha):
-    """Write the motion of body i from the motion of its marker at the joint."""
+def put_body(model, work, tree, i, motion):
+    """Write the motion of body i from that of its marker at the joint, as `end_motion` returns it."""
+    r, A, v, omega, a, alpha = motion
     state, u0, m = work.state, model.bodies.u0[i], tree.far[i]
     u, u_dot = state.u[u0 : u0 + 6], state.u_dot[u0 : u0 + 6]
     if m < 0:

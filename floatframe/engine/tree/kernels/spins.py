@@ -174,11 +174,12 @@ def turning_by_columns(tree, joints, i):
 
 
 @inner
-def spin_variations(tree, joints, i, y, theta, c_m, c_d, c_k):
+def spin_variations(tree, joints, i, y, theta, weights):
     """Return theta_dot, theta_ddot of `kernels.jets` for a change y of a spinning body's unknowns, axes of B.
 
     omega changes by c_d y, and alpha - w omega × e by c_m y; both are then rotated by c_k (e · y) about -e.
     """
+    c_m, c_d, c_k = weights
     k, Q = first_rotation(tree, i), joints.Q[i]
     e, omega, alpha = vector(tree.spin_axis[i]), vector(joints.rate[k:]), vector(joints.acceleration[k:])
     if tree.is_reversed[i] != 0:

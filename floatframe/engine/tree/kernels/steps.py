@@ -132,26 +132,27 @@ def begin_anew(model, work, tree, joints, tangent, memory, t):
 
 
 @inner
-def renew(model, work, tree, joints, tangent, c_m, c_d, c_k):
+def renew(model, work, tree, joints, tangent, weights):
     """Renew the factors of the Newton matrix; return whether it is regular.
 
     The factors are exact if wrenches are kept or `tangent.exactly` requires it, otherwise those of
     `kernels.kept_factors`.
     """
+    _, c_d, c_k = weights
     weigh(model, work, tree, joints, tangent)
     if tangent.V.shape[0] > 0 or tangent.exactly > 0:
         tangent.is_exact, tangent.is_kept = 1, 0
-        write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k)
+        write_tangent(model, work, tree, joints, tangent, weights)
         return factorize_tree(model, work, tree, tangent, c_d, c_k)
     tangent.is_exact = 0
     if tangent.is_kept == 0:
-        keep_bodies(model, work, tree, c_m, c_d, c_k)
+        keep_bodies(model, work, tree, weights)
         tangent.is_kept = 1
     if factorize_poses(model, work, tree, joints, tangent, c_d, c_k):
         return True
     tangent.exactly = EXACT_STEPS
     tangent.is_exact, tangent.is_kept = 1, 0
-    write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k)
+    write_tangent(model, work, tree, joints, tangent, weights)
     return factorize_tree(model, work, tree, tangent, c_d, c_k)
 
 
@@ -344,7 +345,8 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
     converge, it restarts again with exact factors in every iteration, because an iterate that approximate factors have
     led far away does not return.
     """
-    c_m, c_d, c_k = newton_weights(order, h)
+    weights = newton_weights(order, h)
+    c_m, c_d, c_k = weights
     work.counted.no_number = 0
     work.counted.stopped = 0
     last, last_of_states, excess, wanted, allowed = math.inf, math.inf, math.inf, 0.0, 0.0
@@ -382,7 +384,7 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
             work.counted.factorisations += 1
             work.solver.is_due = 0
             solver.c_m, solver.c_d, solver.c_k = c_m, c_d, c_k
-            if not renew(model, work, tree, joints, tangent, c_m, c_d, c_k):
+            if not renew(model, work, tree, joints, tangent, weights):
                 work.solver.is_due = 1
                 return SINGULAR, -1, excess, -1.0
         of_rates = 0.0

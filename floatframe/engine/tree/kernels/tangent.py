@@ -69,20 +69,21 @@ __all__ = [
 
 
 @inner
-def write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k):
+def write_tangent(model, work, tree, joints, tangent, weights):
     """Write jets, derivatives of the bodies, and P, V of the connections outside the tree.
 
     `evaluate_tree` must have been called for the iterate. The wrenches of the tree joints on the markers are set to
     zero.
     """
+    _, c_d, c_k = weights
     rate = c_d / c_k if c_k > 0.0 else 0.0
-    write_jets(model, work, tree, joints, tangent, c_m, c_d, c_k, rate)
+    write_jets(model, work, tree, joints, tangent, weights, rate)
     for i in range(tree.parent.shape[0]):
         for m in (tree.near[i], tree.far[i]):
             if m >= 0:
                 work.markers.wrench[m, :] = 0.0
     for i in range(tree.parent.shape[0]):
-        of_body(model, work, joints, tangent, i, c_m, c_d, c_k)
+        of_body(model, work, joints, tangent, i, weights)
     for e in range(tree.kept.shape[0]):
         connection_derivatives(model, work, tree.kept[e], c_k)
     tangent.V[:, :] = 0.0
@@ -100,11 +101,11 @@ def write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k):
             first = tree.kept_row[model.connections.w0[c]]
             kept_marker(model, work, tree, tangent, m, first, rate)
             if model.markers.accelerated[m] >= 0:
-                accelerated_marker(model, work, tree, tangent, m, first, c_m, c_d, c_k)
+                accelerated_marker(model, work, tree, tangent, m, first, weights)
 
 
 @inner
-def of_body(model, work, joints, tangent, i, c_m, c_d, c_k):
+def of_body(model, work, joints, tangent, i, weights):
     """Write D, F and modal residual derivatives of body i without its subtree, and H with its mode columns.
 
     D and the rows of the modes are those of body_jets.py, plus the rotation of the residual with the body. The terms
@@ -113,7 +114,7 @@ def of_body(model, work, joints, tangent, i, c_m, c_d, c_k):
     n, u0, q0 = model.bodies.n_q[i], model.bodies.u0[i], model.bodies.q0[i]
     turning = work.bodies.T_right[i]
     put_matrix(turning, unit_matrix())
-    tangent_of_body(model, work, i, c_m, c_d, c_k, newton_block(model, work, i), turning)
+    tangent_of_body(model, work, i, weights, newton_block(model, work, i), turning)
     turn, residual = work.bodies.by_turn[u0 : u0 + 6 + n], joints.own[u0 : u0 + 6 + n]
     R, p = body_frame(work, tangent, i)
     v, omega_B, a = vector(work.state.u[u0:]), vector(work.state.u[u0 + 3 :]), vector(work.state.u_dot[u0:])
@@ -307,7 +308,7 @@ def kept_pair(model, work, tangent, m, first, s, xi, xi_dot, unit):
 
 
 @inner
-def accelerated_marker(model, work, tree, tangent, m, first, c_m, c_d, c_k):
+def accelerated_marker(model, work, tree, tangent, m, first, weights):
     """Add the effect of marker m's acceleration on the rows of its connection, which begin at `first`."""
     i = model.markers.body[m]
     b = i
@@ -320,7 +321,7 @@ def accelerated_marker(model, work, tree, tangent, m, first, c_m, c_d, c_k):
     held = carrier(model, work, tangent, m, i)
     for k in range(model.bodies.n_q[i]):
         S, S_1, S_2 = mode_screws(model, work, m, i, k, held)
-        put_mode_jet(tangent.own, S, S_1, S_2, held, c_m, c_d, c_k)
+        put_mode_jet(tangent.own, S, S_1, S_2, held, weights)
         accelerated_pair(model, work, tangent, m, first, tree.m0[i] + k, tangent.own)
 
 
