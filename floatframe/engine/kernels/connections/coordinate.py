@@ -77,7 +77,7 @@ def relative_rotation(markers, a, b):
 @inner
 def turning_gradient(model, work, k, a, b):
     """Return the derivative of an angle by a rotation of A; for a rotation of B it has the opposite sign."""
-    _, t = turned_angle(model.rows, work.markers, k, a, b)
+    _, t = turned_angle(model.rows, work.markers.A, k, a, b)
     return t
 
 

@@ -210,7 +210,7 @@ def screw_value(model, work, k, a, b):
     """Return the value of SCREW, E · d - c th; E: axis, th: angle of D about it, counted to the nearest turn."""
     rows, markers = model.rows, work.markers
     c, d, E = rows.c[k], distance(markers, a, b), axis_between(rows, markers, k, a)
-    th, t = angle_between(rows, markers, k, a, b)
+    th, t = angle_between(rows, markers.A, k, a, b)
     along = dot(E, d)
     turns = math.floor((along / c - th) / (2 * math.pi) + 0.5)
     return along - c * (th + 2 * math.pi * turns), E, sub(cross(E, d), scaled(c, t)), scaled(c, t)

@@ -6,8 +6,8 @@ from typing import NamedTuple
 from fe_models.foundation.arrays import Array
 from floatframe.engine.kernels.compiler.compilation import inner, small, view
 from floatframe.engine.kernels.time_function import time_function
-from floatframe.engine.kernels.vector import add, cross, dot, put, put_sum, scaled, sub, turned, vector
-from floatframe.model.joints.rows.kinds import PUSH, TWIST_B
+from floatframe.engine.kernels.vector import add, cross, dot, norm, put, put_sum, scaled, sub, turned, vector
+from floatframe.model.joints.rows.kinds import PUSH, SPAN, TWIST_B
 
 __all__ = [
     "ByMarkers",
@@ -16,6 +16,7 @@ __all__ = [
     "angle_between",
     "axis_between",
     "by_markers",
+    "coordinate_at",
     "direction",
     "distance",
     "loaded_axis",
@@ -68,13 +69,13 @@ def slip(markers, a, b, d):
 
 
 @inner
-def angle_between(rows, markers, k, a, b):
+def angle_between(rows, A, k, a, b):
     """Return the angle th of D about the axis of row k in A, and its derivative by a rotation of A (by B: opposite).
 
-    th = atan2(S, C), S = -E · D, C = Z · D;  t = -(C E × D + S Z × D)/(S² + C²).
+    th = atan2(S, C), S = -E · D, C = Z · D;  t = -(C E × D + S Z × D)/(S² + C²);  A: axes of the markers.
     """
-    E, Z = direction(markers, a, rows.x[k]), direction(markers, a, rows.z[k])
-    D = direction(markers, b, rows.y[k])
+    E, Z = turned(A[a], vector(rows.x[k])), turned(A[a], vector(rows.z[k]))
+    D = turned(A[b], vector(rows.y[k]))
     S, C = -dot(E, D), dot(Z, D)
     t = scaled(-1.0 / (S * S + C * C), add(scaled(C, cross(E, D)), scaled(S, cross(Z, D))))
     return math.atan2(S, C), t
@@ -87,15 +88,15 @@ def axis_between(rows, markers, k, a):
 
 
 @inner
-def turned_angle(rows, markers, k, a, b):
+def turned_angle(rows, A, k, a, b):
     """Return the angle of B about the axis of row k in A (TWIST_B: in B), and its derivative by a rotation of A.
 
     The derivative by a rotation of B is the opposite.
     """
     if rows.kind[k] == TWIST_B:
-        angle, t = angle_between(rows, markers, k, b, a)
+        angle, t = angle_between(rows, A, k, b, a)
         return -angle, t
-    return angle_between(rows, markers, k, a, b)
+    return angle_between(rows, A, k, a, b)
 
 
 @inner
@@ -107,17 +108,25 @@ def loaded_axis(rows, markers, k, a, b):
 
 
 @inner
+def coordinate_at(rows, r, A, k, a, b):
+    """Return the coordinate of row k for positions r and axes A of the markers; angles are between -pi and pi."""
+    if rows.kind[k] != PUSH and rows.kind[k] != SPAN:
+        angle, _ = turned_angle(rows, A, k, a, b)
+        return angle
+    d = sub(vector(r[b]), vector(r[a]))
+    return norm(d) if rows.kind[k] == SPAN else dot(turned(A[a], vector(rows.x[k])), d)
+
+
+@inner
 def loaded_coordinate(rows, markers, k, a, b):
     """Return value and rate of a coordinate along which forces act.
 
     It is a distance along an axis of A, or an angle about it (TWIST_B: about an axis of B).
     """
-    e = loaded_axis(rows, markers, k, a, b)
+    x, e = coordinate_at(rows, markers.r, markers.A, k, a, b), loaded_axis(rows, markers, k, a, b)
     if rows.kind[k] != PUSH:
-        angle, _ = turned_angle(rows, markers, k, a, b)
-        return angle, dot(e, sub(vector(markers.omega[b]), vector(markers.omega[a])))
-    d = distance(markers, a, b)
-    return dot(e, d), dot(e, slip(markers, a, b, d))
+        return x, dot(e, sub(vector(markers.omega[b]), vector(markers.omega[a])))
+    return x, dot(e, slip(markers, a, b, distance(markers, a, b)))
 
 
 @inner
@@ -126,7 +135,7 @@ def add_coordinate_gradient(rows, markers, k, a, b, by, by_x, by_v):
     e = loaded_axis(rows, markers, k, a, b)
     add_pair(by, 9 if rows.kind[k] != PUSH else 6, scaled(-by_v, e))
     if rows.kind[k] != PUSH:
-        _, t = turned_angle(rows, markers, k, a, b)
+        _, t = turned_angle(rows, markers.A, k, a, b)
         add_pair(by, 3, scaled(by_x, t))
         turn = cross(e, sub(vector(markers.omega[b]), vector(markers.omega[a])))
         put_sum(by.b if rows.kind[k] == TWIST_B else by.a, 3, scaled(by_v, turn))

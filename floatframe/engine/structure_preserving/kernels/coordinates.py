@@ -14,7 +14,8 @@ velocities: their impulse is exactly h Q, and their work h Q times the rate.
 import math
 
 from floatframe.engine.kernels.compiler.compilation import inner
-from floatframe.engine.kernels.vector import add, cross, dot, norm, scaled, sub, turned, vector
+from floatframe.engine.kernels.joints.relative_motion import coordinate_at
+from floatframe.engine.kernels.vector import add, cross, dot, norm, scaled, sub, vector
 from floatframe.engine.structure_preserving.kernels.markers import (
     add_moment,
     add_pair,
@@ -24,10 +25,10 @@ from floatframe.engine.structure_preserving.kernels.markers import (
     mean_direction,
     turning,
 )
-from floatframe.engine.structure_preserving.kernels.rows import add_slide, angle_loads, angle_of
+from floatframe.engine.structure_preserving.kernels.rows import add_slide, angle_loads
 from floatframe.model.joints.rows.kinds import PUSH, SPAN, TWIST_B
 
-__all__ = ["add_coordinate_force", "add_impulsive_force", "coordinate_at", "coordinate_change", "coordinate_ends",
+__all__ = ["add_coordinate_force", "add_impulsive_force", "coordinate_change", "coordinate_ends",
            "coordinate_rate", "counted", "ends_of_step", "span"]  # fmt: skip
 
 
@@ -48,23 +49,9 @@ def coordinate_change(model, discrete, step, k, a, b):
 
 
 @inner
-def coordinate_at(model, x, A, k, a, b):
-    """Return the coordinate of row k for marker positions x and axes A; angles are between -pi and pi."""
-    kind = model.rows.kind[k]
-    if kind == TWIST_B:
-        return -angle_of(model, A, k, b, a)
-    d = sub(vector(x[b]), vector(x[a]))
-    if kind == PUSH:
-        return dot(turned(A[a], vector(model.rows.x[k])), d)
-    if kind == SPAN:
-        return norm(d)
-    return angle_of(model, A, k, a, b)
-
-
-@inner
 def coordinate_ends(model, step, k, a, b, change):
     """Return the coordinate of row k at both ends of the force interval; angles are not counted."""
-    end = coordinate_at(model, step.x_f, step.A_f, k, a, b)
+    end = coordinate_at(model.rows, step.x_f, step.A_f, k, a, b)
     if step.is_still:
         return end, end
     return end - change, end
@@ -81,8 +68,8 @@ def counted(model, k, x, known):
 @inner
 def ends_of_step(model, step, k, a, b):
     """Return the counted coordinate of row k at both ends of the step."""
-    begin = counted(model, k, coordinate_at(model, step.x_0, step.A_0, k, a, b), step.known[k])
-    return begin, counted(model, k, coordinate_at(model, step.end.markers.r, step.end.markers.A, k, a, b), begin)
+    begin = counted(model, k, coordinate_at(model.rows, step.x_0, step.A_0, k, a, b), step.known[k])
+    return begin, counted(model, k, coordinate_at(model.rows, step.end.markers.r, step.end.markers.A, k, a, b), begin)
 
 
 @inner

@@ -33,7 +33,7 @@ from floatframe.model.joints.rows.kinds import (
     TURN_B,
 )
 
-__all__ = ["add_reaction", "add_slide", "angle_loads", "angle_of", "force_of_row", "held", "mean_distance",
+__all__ = ["add_reaction", "add_slide", "angle_loads", "force_of_row", "held", "mean_distance",
            "row_rate", "row_value"]  # fmt: skip
 
 
@@ -138,13 +138,6 @@ def row_rate(model, step, k, a, b, t):
     e, y = directions(model, k, t)
     A_a, A_b = step.A_0[a], step.A_0[b]
     return dot(turned(A_a, e[1]), turned(A_b, y[0])) + dot(turned(A_a, e[0]), turned(A_b, y[1]))
-
-
-@inner
-def angle_of(model, A, k, a, b):
-    """Return the angle of D in row k, measured from Z towards -E; A: marker axes."""
-    D = turned(A[b], vector(model.rows.y[k]))
-    return math.atan2(-dot(turned(A[a], vector(model.rows.x[k])), D), dot(turned(A[a], vector(model.rows.z[k])), D))
 
 
 @inner
