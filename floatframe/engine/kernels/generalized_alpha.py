@@ -110,6 +110,8 @@ SAFETY = 0.9  # safety factor on the step that would just meet the allowed error
 LEAST, MOST, WORTH = 0.2, 2.0, 1.2
 # ratio of an angular acceleration to the same without the rotation of the axis, below which the rotation is steady
 STEADY = 0.1
+FEW = 5  # number of iterations up to which a step may be followed by one that begins with its factors of connections
+SAME_TIME = 1e-3  # difference of times, relative to the step, below which they count as equal
 SAME = 1e-12  # relative difference below which step sizes count as equal
 
 
@@ -526,6 +528,16 @@ def newton_weights(order, h):
 
 
 @inner
+def keeps_connections(model, work, h):
+    """Whether a step of size h begins with the factors of the connections of the step before.
+
+    With states they are renewed at the second iterate in any case, which suffices after a step that converged fast.
+    """
+    has_states = model.states.row.shape[0] + model.laws.equation.shape[0] > 0
+    return has_states and work.solver.is_due == 0 and abs(work.state.time - h - work.solver.t_end) <= SAME_TIME * h
+
+
+@inner
 def one_step(model, work, memory, order, h):
     """Advance the memory by one step, unless the estimated error is larger than allowed.
 
@@ -548,7 +560,7 @@ def one_step(model, work, memory, order, h):
     mass = total_mass(model)
     least_gap = SAFE * wanted / math.sqrt(mass) if mass > 0.0 else 0.0  # all bodies are within the limit
     has_states = model.states.row.shape[0] + model.laws.equation.shape[0] > 0
-    is_new, is_aged, first_of_rates = not has_states, False, 0.0  # states renew the connections at the next iterate
+    is_new, is_aged, first_of_rates = not keeps_connections(model, work, h), False, 0.0
     for iteration in range(order.max_iterations):
         evaluate(model, work, c_k)
         if iteration == 0 and order.stabilized != 0:
@@ -628,6 +640,7 @@ def one_step(model, work, memory, order, h):
                 if not error <= order.most_error:
                     return INACCURATE, -1, excess, error
             accept(model, work, memory, order, h)
+            solver.t_end = work.state.time if iteration < FEW else -math.inf
             return DONE, -1, excess, error
         if norm > SLOW * last and not is_small:
             work.solver.is_due = 1
@@ -951,7 +964,10 @@ def try_absolute_step(model, work, memory, others, order, t, h):
     if is_resized(model, work, memory, order, h):
         resize(model, work, memory, t, h)
     work.state.time = t
-    return one_step(model, work, memory, order, memory.h)
+    is_old, found = keeps_connections(model, work, h), one_step(model, work, memory, order, memory.h)
+    if found[0] == DIVERGED and is_old:  # all factors are renewed now
+        found = one_step(model, work, memory, order, memory.h)
+    return found
 
 
 @inner

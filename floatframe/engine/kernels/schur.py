@@ -29,7 +29,19 @@ from floatframe.engine.kernels.dense import (
 )
 from floatframe.engine.kernels.evaluation import linearize, linearize_body
 from floatframe.engine.kernels.model import STIFFNESS
-from floatframe.engine.kernels.vector import add, copy, dot, put, put_sum, scaled, sub, turned, turned_back, vector
+from floatframe.engine.kernels.vector import (
+    add,
+    copy,
+    dot,
+    norm,
+    put,
+    put_sum,
+    scaled,
+    sub,
+    turned,
+    turned_back,
+    vector,
+)
 from floatframe.model.joints.rows.kinds import NOTHING
 
 __all__ = [
@@ -47,7 +59,9 @@ __all__ = [
     "velocity_gaps",
 ]
 
-TURNING = 0.02  # rotation in a step [rad] above which the factors of a rigid body are renewed in every step
+# rotation in a step [rad] with which the factors of a rigid body are renewed in every step: with less the old ones are
+# as good, with more the prediction may be so far off that they are better
+TURNING = (0.02, 0.5)
 SOFTER = 1e3  # s of `share_reactions`: s S is well above the roundoff of A
 SWEEPS = 5  # number of iterations: with soft 1e-9 of A, constraints with a condition number of 1e4 share to 1e-10
 
@@ -98,10 +112,10 @@ def factorize_body(model, work, i):
 
 @inner
 def renew_turning(model, work, weights):
-    """Linearise and factorise the rigid bodies that rotate by more than `TURNING` in the step."""
+    """Linearise and factorise the rigid bodies whose rotation in the step is within `TURNING`."""
     for i in range(model.bodies.kind.shape[0]):
-        theta = vector(work.state.theta[i])
-        if model.bodies.n_q[i] == 0 and dot(theta, theta) > TURNING * TURNING:
+        theta = norm(vector(work.state.theta[i]))
+        if model.bodies.n_q[i] == 0 and TURNING[0] < theta < TURNING[1]:
             linearize_body(model, work, i, weights)
             if not factorize_body(model, work, i):
                 return i

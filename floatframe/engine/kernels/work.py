@@ -292,6 +292,7 @@ class Solver(NamedTuple):
     c_m: Array = real()  #: weights c_m, c_d, c_k for which H was factorised, zero if never
     c_d: Array = real(unit="s")
     c_k: Array = real(unit="s²")
+    t_end: Array = real(unit="s")  #: time at the end of the last step if it converged fast
     is_due: IntArray = integer()  #: whether to factorise at the next iterate
     price: Array = real()  #: cost of new factors, expressed in iterations
     n_steps: IntArray = integer()  #: number of steps with the present factors
