@@ -1,4 +1,4 @@
-"""Reference pages, made from the programs: commands, keys of text files, content of HDF5 files, fields of decks."""
+"""Reference pages, made from the programs: commands, keys and contents of files, checks, fields of decks."""
 
 import json
 import re
@@ -14,6 +14,7 @@ from sphinx.application import Sphinx
 import cms.cli.app
 import cms.cli.exchange
 import floatframe.cli.app
+from cms.assessment.quality.limits import LIMITS
 from cms.body.modal_file.schema import ENTRIES, GROUPS, dataset_of
 from fe_models.files.field_pages import field_tables
 from fe_models.foundation.file_kinds import KINDS
@@ -34,6 +35,7 @@ def write_pages(app: Sphinx) -> None:
     pages = {f"{name}-commands.md": commands_page(name) for name in PROGRAMS}
     pages |= {f"{kind}-file.md": keys_page(kind) for kind in KINDS}
     pages |= {"modal-file.md": modal_file_page(), "results-file.md": results_file_page()}
+    pages |= {"check-records.md": checks_page()}
     pages |= {"deck-fields.md": fields_page(), "formats.md": formats_page()}
     for old in folder.glob("*.md"):
         if old.name not in pages:
@@ -183,6 +185,34 @@ def results_file_page() -> str:
         *table(("dataset", "shape", "unit in m-kg-s", "meaning"), rows), "",
     ]  # fmt: skip
     return "\n".join(lines)
+
+
+# checks --------------------------------------------------------------------------------------------------------
+
+
+def checks_page() -> str:
+    """Return the page of all records of checks, with their limits and remedies."""
+    rows = [
+        (
+            f"`{name}`",
+            literal(limit.title),
+            limit_cell(limit.tolerance),
+            limit_cell(limit.failing),
+            literal(limit.action),
+        )
+        for name, limit in LIMITS.items()
+    ]
+    lines = [
+        "# Records of checks", "",
+        "[How good is my reduced body?](../quality.md) says which command gives which record.", "",
+        *table(("record", "value", "passes up to", "fails above", "if it does not pass"), rows), "",
+    ]  # fmt: skip
+    return "\n".join(lines)
+
+
+def limit_cell(limit: float | None) -> str:
+    """Return a limit as a cell of a table."""
+    return "–" if limit is None else f"{limit:.7g}"
 
 
 # decks ---------------------------------------------------------------------------------------------------------

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from cms.assessment.quality.limits import LIMITS
 from cms.body.modal_file.schema import ENTRIES, GROUPS
 from fe_models.door import namespaces
 from fe_models.files.abaqus.keywords import PARAMETERS
@@ -69,7 +70,15 @@ def test_reference_pages_hold_every_command_option_and_key(tmp_path):
     (tmp_path / "reference" / "gone-file.md").write_text("old")
     reference_pages.write_pages(SimpleNamespace(srcdir=tmp_path))
     pages = {path.stem: path.read_text(encoding="utf-8") for path in (tmp_path / "reference").glob("*.md")}
-    made = {"cms-commands", "floatframe-commands", "deck-fields", "formats", "modal-file", "results-file"}
+    made = {
+        "cms-commands",
+        "floatframe-commands",
+        "deck-fields",
+        "formats",
+        "modal-file",
+        "results-file",
+        "check-records",
+    }
     assert set(pages) == made | {f"{kind}-file" for kind in KINDS}
     reduce = pages["cms-commands"].split("### cms reduce\n")[1].split("###")[0]
     assert re.search(
@@ -100,6 +109,12 @@ def test_the_page_of_a_modal_file_has_every_dataset_and_attribute_in_its_group()
         for name in layout.attributes:
             assert re.search(rf"^\| `{name}` \| (?:text|integer|float) \| [^|]", sections[group], re.MULTILINE)
     assert "| mass^(-1/2) (rows 0-2), mass^(-1/2) length^-1 (rows 3-5) |" in sections["/interfaces/<i>"]
+
+
+def test_the_page_of_checks_has_every_record_with_its_limits():
+    rows = re.findall(r"^\| `([\w-]+)` \| [^|]+ \| (\S+) \| (\S+) \|", reference_pages.checks_page(), re.MULTILINE)
+    found = {name: [None if cell == "–" else float(cell) for cell in cells] for name, *cells in rows}
+    assert found == {name: [limit.tolerance, limit.failing] for name, limit in LIMITS.items()}
 
 
 def test_the_page_of_a_results_file_has_every_dataset_with_named_sizes():

@@ -7,7 +7,6 @@ import pytest
 from cms.assessment.quality.errors import QualityError
 from cms.assessment.quality.limits import LIMITS
 from cms.assessment.quality.record import has_failed, information, judge, plain, worst
-from tests.root import ROOT
 
 
 def test_a_value_at_its_tolerance_passes_and_between_both_limits_warns():
@@ -38,16 +37,6 @@ def test_every_limit_that_judges_says_what_to_do(name):
     limit = LIMITS[name]
     assert limit.tolerance is None or limit.action
     assert limit.failing is None or limit.failing >= limit.tolerance
-
-
-def test_the_documentation_states_every_limit_as_the_code_does():
-    rows = {}
-    pages = [(ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8") for name in ("quality", "test_and_model")]
-    for line in "\n".join(pages).splitlines():
-        cells = [cell.strip() for cell in line.split("|")]
-        if line.startswith("| `"):
-            rows[cells[1].strip("`")] = [None if cell == "-" else float(cell) for cell in cells[-3:-1]]
-    assert rows == {name: [limit.tolerance, limit.failing] for name, limit in LIMITS.items()}
 
 
 def test_an_unknown_name_is_refused_with_the_nearest():
