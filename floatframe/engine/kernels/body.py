@@ -50,7 +50,7 @@ from floatframe.engine.kernels.vector import (
 )
 
 __all__ = [
-    "Weights",
+    "NewtonWeights",
     "body_forces",
     "body_mass_product",
     "body_tangent",
@@ -68,8 +68,8 @@ __all__ = [
 ]
 
 
-class Weights(NamedTuple):
-    """Weights of a Newton matrix: changes of accelerations, velocities and positions by its unknowns."""
+class NewtonWeights(NamedTuple):
+    """NewtonWeights of a Newton matrix: changes of accelerations, velocities and positions by its unknowns."""
 
     c_m: float  #: of the mass
     c_d: float  #: of the damping

@@ -11,7 +11,7 @@ from numba import types
 
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.stages import announced_compilation
-from floatframe.engine.kernels.body import Weights
+from floatframe.engine.kernels.body import NewtonWeights
 from floatframe.engine.kernels.compiler.choice import compiler, is_interpreted, is_lean, words
 from floatframe.engine.kernels.compiler.compilation import kept_entry
 from floatframe.engine.kernels.compiler.sources import source_digest
@@ -110,7 +110,7 @@ def make_entry(digest):
             write_row(model, work, memory, order.t0, rows)
             memory.power[GIVEN], memory.power[TAKEN] = power(model, work)
         else:
-            weights, c_k = Weights(order.c_m, order.c_d, order.c_k), order.c_k
+            weights, c_k = NewtonWeights(order.c_m, order.c_d, order.c_k), order.c_k
             evaluate(model, work, c_k if c_k > 0.0 else 1.0)
             if what == LINEARIZE:
                 linearize(model, work, weights)

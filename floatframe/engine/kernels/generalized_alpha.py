@@ -5,7 +5,7 @@ Described in `floatframe.integrators.generalized_alpha`.
 
 import math
 
-from floatframe.engine.kernels.body import Weights, body_mass_product, modal_number, modal_term
+from floatframe.engine.kernels.body import NewtonWeights, body_mass_product, modal_number, modal_term
 from floatframe.engine.kernels.compiler.compilation import inner, small
 from floatframe.engine.kernels.connections.gap import next_step, step_before_contact, take_ends
 from floatframe.engine.kernels.connections.user_force import resize_states
@@ -524,7 +524,7 @@ def mean_square(model, work, i, jump):
 @inner
 def newton_weights(order, h):
     """Return the derivatives of u_dot, u and x by the algorithmic acceleration a."""
-    return Weights((1 - order.alpha_m) / (1 - order.alpha_f), order.gamma * h, order.beta * h * h)
+    return NewtonWeights((1 - order.alpha_m) / (1 - order.alpha_f), order.gamma * h, order.beta * h * h)
 
 
 @inner

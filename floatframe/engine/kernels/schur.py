@@ -9,7 +9,7 @@ and Z do not rotate with the body, so that they can be used for many steps; P, R
 
 import math
 
-from floatframe.engine.kernels.body import Weights, modal_number, newton_block
+from floatframe.engine.kernels.body import NewtonWeights, modal_number, newton_block
 from floatframe.engine.kernels.compiler.compilation import inner, loops, small, view
 from floatframe.engine.kernels.connections.connection import (
     connection_derivatives,
@@ -442,7 +442,7 @@ def assemble_masses(model, work, c_k):
     Modes without mass get c_k times their stiffness as mass.
     """
     bodies, types = model.bodies, model.body_types
-    linearize(model, work, Weights(1.0, 0.0, 0.0))
+    linearize(model, work, NewtonWeights(1.0, 0.0, 0.0))
     for i in range(bodies.kind.shape[0]):
         n, t = 6 + bodies.n_q[i], bodies.kind[i]
         H = newton_block(model, work, i)

@@ -2,7 +2,7 @@
 
 import math
 
-from floatframe.engine.kernels.body import Weights
+from floatframe.engine.kernels.body import NewtonWeights
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.connection import constraint_rates
 from floatframe.engine.kernels.connections.coordinate import predict_coordinate
@@ -68,7 +68,7 @@ def solve_accelerations(model, work, is_linear):
         for k in range(g.shape[0]):
             if model.rows.holds[k] != NOTHING:
                 g[k] = work.connections.bias[k]
-        linearize(model, work, Weights(1.0, 0.0, 0.0))
+        linearize(model, work, NewtonWeights(1.0, 0.0, 0.0))
         if not factorize_system(model, work):
             return False
         correction(model, work, 1.0, False)

@@ -4,7 +4,7 @@
 (3) M u_dot - Jᵀ w = f,    G u_dot = -d(G)/dt u     accelerations and reactions for these velocities
 """
 
-from floatframe.engine.kernels.body import Weights, newton_block
+from floatframe.engine.kernels.body import NewtonWeights, newton_block
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.connection import constraint_rates
 from floatframe.engine.kernels.dense import matrix_at
@@ -29,7 +29,7 @@ def close_velocities(model, work, discrete):
         is_open = is_open or g[k] != 0.0
     if not is_open:
         return True
-    linearize(model, work, Weights(1.0, 0.0, 0.0))
+    linearize(model, work, NewtonWeights(1.0, 0.0, 0.0))
     for i in range(model.bodies.kind.shape[0]):
         n, H = model.bodies.n_q[i], newton_block(model, work, i)
         weighted = matrix_at(discrete.weighted, discrete.weighted0[i], n, n)

@@ -7,7 +7,7 @@ with the matrices of `kernels.tangent` for the weights (1, 0, 0). Rows that defi
 Described in `floatframe.integrators.relative_ode`.
 """
 
-from floatframe.engine.kernels.body import Weights
+from floatframe.engine.kernels.body import NewtonWeights
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.connection import connection_rates
 from floatframe.engine.kernels.marker import marker_acceleration
@@ -28,7 +28,7 @@ def constrain(model, work, tree, joints, tangent, is_group):
     evaluate_tree(model, work, tree, joints, 1.0)
     if not is_group:
         joints.x[:] = 0.0
-    write_tangent(model, work, tree, joints, tangent, Weights(1.0, 0.0, 0.0))
+    write_tangent(model, work, tree, joints, tangent, NewtonWeights(1.0, 0.0, 0.0))
     kept_rates(model, work, tree)
 
 

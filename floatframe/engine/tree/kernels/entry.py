@@ -3,7 +3,7 @@
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.engine.kernels.body import Weights
+from floatframe.engine.kernels.body import NewtonWeights
 from floatframe.engine.kernels.compiler.compilation import kept_entry
 from floatframe.engine.kernels.compiler.structure import converter
 from floatframe.engine.kernels.diagnostics import power
@@ -76,14 +76,14 @@ def make_entry(digest):
             if not accelerate(model, work, tree, joints, tangent):
                 return SINGULAR, 0, 0, -1, 0.0
         elif what == CORRECT:
-            weights, c_k = Weights(order.c_m, order.c_d, order.c_k), order.c_k
+            weights, c_k = NewtonWeights(order.c_m, order.c_d, order.c_k), order.c_k
             evaluate_tree(model, work, tree, joints, c_k)
             tangent.is_kept, tangent.exactly = 0, 1 - order.n_steps
             if not renew(model, work, tree, joints, tangent, weights):
                 return SINGULAR, 0, 0, -1, 0.0
             correct(model, work, tree, joints, tangent, c_k)
         else:
-            weights, c_k = Weights(order.c_m, order.c_d, order.c_k), order.c_k
+            weights, c_k = NewtonWeights(order.c_m, order.c_d, order.c_k), order.c_k
             evaluate_tree(model, work, tree, joints, c_k if c_k > 0.0 else 1.0)
             write_tangent(model, work, tree, joints, tangent, weights)
             assemble(model, work, tree, tangent, order.c_d, c_k)

@@ -13,7 +13,7 @@ correction of the unknown. The unknown of a group of rotations is the vector x w
 theta = T(x) dx, and the rates z_dot, z_ddot, in axes of B, change by d(z_dot) = theta_dot + z_dot × theta.
 """
 
-from floatframe.engine.kernels.body import Weights
+from floatframe.engine.kernels.body import NewtonWeights
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.vector import add, cross, put, scaled, sub, turned, vector
 from floatframe.engine.tree.kernels.kinematics import end_motion, joint_ends
@@ -143,5 +143,5 @@ def column_jets(model, work, tree, joints, tangent, i, weights, rate):
             put_jets(jet, S_0, S_1, S_2, V_b, V_b_dot)
             th_1 = sub(scaled(rate, alpha), cross(spin, theta))
             if joints.spins[i] != 0:
-                th_1, _ = spin_variations(tree, joints, i, alpha, theta, Weights(0.0, rate, 1.0))
+                th_1, _ = spin_variations(tree, joints, i, alpha, theta, NewtonWeights(0.0, rate, 1.0))
             put_reach(reach, world_screw(A_b, p_b, (zero, theta)), world_screw(A_b, p_b, (zero, th_1)), V_b)

@@ -22,7 +22,7 @@ momentum); in ground axes also by S ×* f. This leads to the following steps:
 Sources: Carpentier & Mansard (2018); Singh, Russell & Wensing (2022) for rigid bodies; derived anew for flexible ones.
 """
 
-from floatframe.engine.kernels.body import Weights, body_tangent, moved_inertia
+from floatframe.engine.kernels.body import NewtonWeights, body_tangent, moved_inertia
 from floatframe.engine.kernels.compiler.compilation import loops, small
 from floatframe.engine.kernels.vector import (
     add,
@@ -249,7 +249,9 @@ def tangent_columns(nodes, work, dense, model, marker_work, k, c_d, c_k, first):
     """Add the tangent of flexible body k's equations by its modes (c_k = 1) or modal rates (c_d = 1) (4)."""
     n, vq = nodes.n_q[k], nodes.vq[k]
     H = body_matrix(nodes, work, k)
-    body_tangent(model, marker_work, nodes.body[k], Weights(0.0, c_d, c_k), H, marker_work.bodies.by_turn[: 6 + n])
+    body_tangent(
+        model, marker_work, nodes.body[k], NewtonWeights(0.0, c_d, c_k), H, marker_work.bodies.by_turn[: 6 + n]
+    )
     R, r = work.R_G[k], vector(work.r_G[k])
     out = dense.by_z if first == 0 else dense.by_rate
     for j in range(n):

@@ -156,7 +156,9 @@ def test_what_is_written_holds_the_same_numbers(file, folder):
     name = BODY.node_name(int(made.result.nodes[worst]))
     assert name in text
     record = json.loads((folder / "job.json").read_text())
-    assert record == json.loads(answer_of_floatframe("fatigue", file, "--json"))
+    assert {name: part for name, part in record.items() if name != "table"} == json.loads(
+        answer_of_floatframe("fatigue", file, "--json")
+    )
     assert record["worst"][0]["node"] == name
     assert_allclose(record["worst"][0]["life"], 30 / made.result.damage[worst], rtol=1e-12)
     with open(folder / "job.csv", newline="") as table:
