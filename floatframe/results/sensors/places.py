@@ -298,6 +298,8 @@ class AngleSensor:
 class DisplacementSensor:
     """Elastic displacement (x, y, z, size) of an interface or node of a flexible body in body axes, from all modes.
 
+    It is relative to the body frame of the modal file: in mean axes, less than relative to a clamped end.
+
     Parameters
     ----------
     name
