@@ -9,7 +9,14 @@ import scipy.linalg as la
 from cms.errors import ModeSetError
 from cms.modes.families.families import Families, body_of, families_of
 from cms.modes.mode_set import Block, ModeSet, mode_set, require_interfaces, rigid_block
-from cms.modes.mode_sets.elastic_system import check_options, chosen_dofs, damping_description, elastic_system
+from cms.modes.mode_sets.elastic_system import (
+    check_options,
+    chosen_dofs,
+    damping_description,
+    elastic_system,
+    first_independent,
+    require_damped,
+)
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.tall.columns import combine
@@ -21,7 +28,6 @@ __all__ = ["BalancedSystem", "balance", "balanced_truncation"]
 # Balancing of a second-order system in modal coordinates: Gramians, Hankel and position-velocity singular values.
 
 
-NOTHING_NEW = 1e-6  #: remainder of a unit direction outside the span of earlier ones, below which it is dependent
 NEGATIVE = 1e-9  #: largest negative eigenvalue of a Gramian relative to its largest, that counts as rounding
 
 
@@ -73,12 +79,7 @@ def balance(omega2: Array, D: Array, B: Array, C: Array | None = None) -> Balanc
     n = len(omega2)
     omega = np.sqrt(omega2)
     A = np.block([[np.zeros((n, n)), np.diag(omega)], [-np.diag(omega), -D]])
-    decay = -la.eigvals(A).real
-    if decay.min() <= 1e-10 * omega.min():
-        raise ModeSetError(
-            f"balance: a mode decays at {decay.min():.1e} per time unit, with a frequency of at least "
-            f"{omega.min() / (2 * np.pi):.6g}; expected damping of every mode; give damping_ratio above 0"
-        )
+    require_damped("balance", la.eigvals(A), omega2)
     E = np.block([[D / np.outer(omega, omega), np.diag(1 / omega)], [np.diag(1 / omega), np.zeros((n, n))]])
     P = gramian(A, B)  # (1)
     R = root(P)
@@ -129,16 +130,7 @@ def in_turn(reached: Array, seen: Array) -> Array:
         Directions by descending importance, (n, n) each.
     """
     n = len(reached)
-    T = np.zeros((n, 0))
-    for k in range(n):
-        for v in (reached[:, k], seen[:, k]):
-            length = float(np.linalg.norm(v))
-            rest = v / length if length > 0 else v
-            for _ in range(2):  # twice is enough
-                rest = rest - T @ (T.T @ rest)
-            left = float(np.linalg.norm(rest))
-            if left > NOTHING_NEW and T.shape[1] < n:
-                T = np.hstack([T, rest[:, None] / left])
+    T = first_independent(np.stack([reached, seen], axis=2).reshape(n, -1), np.zeros((n, 0)), n)
     return np.hstack([T, la.null_space(T.T)]) if T.shape[1] < n else T
 
 

@@ -21,7 +21,10 @@ from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.tall.columns import combine, gram
 from fe_models.foundation.words import nearest
 
-__all__ = ["ElasticSystem", "check_options", "chosen_dofs", "damping_description", "elastic_system"]
+__all__ = [
+    "NOTHING_NEW", "ElasticSystem", "check_options", "chosen_dofs", "damping_description", "elastic_system",
+    "first_independent", "require_damped",
+]  # fmt: skip
 
 FEWEST_RICH = 60  #: smallest number of free modes of the rich basis
 LOWER_PART = 0.6  #: default number of modes in the rich basis of a small body, as a share of all its modes
@@ -29,8 +32,10 @@ RICH_FACTOR = 3  #: number of free modes of the rich basis per requested mode
 #: length of a residual attachment mode relative to the attachment mode, below which it is rounding
 NOTHING_LEFT = 1e-7
 STIFF = 1e-12  #: compliance of a boundary dof relative to the largest, below which it is rounding
+UNDAMPED = 1e-10  #: decay of a pole relative to the lowest frequency, below which it is undamped
+#: remainder of a unit direction outside the span of earlier ones, below which it is dependent
+NOTHING_NEW = 1e-6
 FEWEST_FOUND = 4  #: smallest number of free modes that the rich basis needs
-
 
 log = logging.getLogger(__name__)
 
@@ -104,6 +109,32 @@ def check_options(
         raise ModeSetError(f"{name}: damping_ratio = {damping_ratio}; expected 0 to 1 (0.01 is 1 %)")
     if n_rich is not None and n_rich < 1:
         raise ModeSetError(f"{name}: n_rich = {n_rich}; expected 1 or more")
+
+
+def require_damped(name: str, poles: Array, omega2: Array) -> None:
+    """Raise `ModeSetError` if a pole hardly decays, so that its Gramian or H2 norm is infinite."""
+    decay, lowest = -float(poles.real.max()), float(np.sqrt(omega2.min()))
+    if decay <= UNDAMPED * lowest:
+        raise ModeSetError(
+            f"{name}: a mode decays at {decay:.1e} per time unit, with a frequency of at least "
+            f"{lowest / (2 * np.pi):.6g}; expected damping of every mode; give damping_ratio above 0"
+        )
+
+
+def first_independent(V: Array, fixed: Array, n: int) -> Array:
+    """Return the first n columns of V outside the span of fixed orthonormal ones, orthonormalised in their order."""
+    found = fixed
+    for v in V.T:
+        if found.shape[1] - fixed.shape[1] == n:
+            break
+        length = float(np.linalg.norm(v))
+        rest = v / length if length > 0 else v
+        for _ in range(2):  # two passes suffice
+            rest = rest - found @ (found.T @ rest)
+        left = float(np.linalg.norm(rest))
+        if left > NOTHING_NEW:
+            found = np.hstack([found, rest[:, None] / left])
+    return found[:, fixed.shape[1] :]
 
 
 def damping_description(body: FEBody, damping_ratio: float) -> str:

@@ -13,13 +13,20 @@ from cms.errors import ModeSetError
 from cms.modes.families.families import Families, body_of, families_of
 from cms.modes.mode_set import Block, ModeSet, boundary_block, mode_set, require_interfaces, rigid_block
 from cms.modes.mode_sets.balanced import balance
-from cms.modes.mode_sets.elastic_system import check_options, chosen_dofs, damping_description, elastic_system
+from cms.modes.mode_sets.elastic_system import (
+    NOTHING_NEW,
+    check_options,
+    chosen_dofs,
+    damping_description,
+    elastic_system,
+    first_independent,
+    require_damped,
+)
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.tall.columns import combine
 
 __all__ = ["H2Problem", "PoleResidues", "h2_optimal", "pole_residues"]
-
 
 log = logging.getLogger(__name__)
 
@@ -28,8 +35,6 @@ WINDOW = 10  #: number of iterations over which the decrease of the error is jud
 STATIONARY = 1e-3  #: relative decrease of the error over the window, below which the directions are stationary
 EXACT = 1e-13  #: squared relative error that is rounding
 REMEMBERED = 20  #: number of steps that L-BFGS remembers
-NOTHING_NEW = 1e-6  #: remainder of a unit direction outside the span of earlier ones, below which it is dependent
-UNDAMPED = 1e-10  #: decay of a pole relative to the lowest frequency, below which it is undamped
 COINCIDENT = 1e-10  #: distance of the two poles of a mode relative to their size, below which they are one
 
 
@@ -115,12 +120,7 @@ class H2Problem:
         """
         self.omega2, self.D, self.B = omega2, D, B
         self.whole = pole_residues(omega2, D, B)
-        decay, lowest = -self.whole.p.real.max(), float(np.sqrt(omega2.min()))
-        if decay <= UNDAMPED * lowest:
-            raise ModeSetError(
-                f"h2_optimal: a mode decays at {decay:.1e} per time unit, with a frequency of at least "
-                f"{lowest / (2 * np.pi):.6g}; expected damping of every mode; give damping_ratio above 0"
-            )
+        require_damped("h2_optimal", self.whole.p, omega2)
         values, _ = self.whole.at(-self.whole.p, self.whole.r)
         self.norm2 = float(np.sum(self.whole.r.T * values).real)  #: |H|²
 
@@ -240,21 +240,6 @@ def best_directions(
         decrease=decrease(),
         change=float(np.abs(frequencies[0] / frequencies[1] - 1).max()),
     )
-
-
-def first_independent(V: Array, fixed: Array, n: int) -> Array:
-    """Return the first n columns of V outside the span of fixed orthonormal ones, orthonormalised in their order."""
-    found = fixed
-    for v in V.T:
-        if found.shape[1] - fixed.shape[1] == n:
-            break
-        rest = v / np.linalg.norm(v)
-        for _ in range(2):  # two passes suffice
-            rest = rest - found @ (found.T @ rest)
-        left = float(np.linalg.norm(rest))
-        if left > NOTHING_NEW:
-            found = np.hstack([found, rest[:, None] / left])
-    return found[:, fixed.shape[1] :]
 
 
 def dominant_modes(problem: H2Problem) -> Array:

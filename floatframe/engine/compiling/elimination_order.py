@@ -3,6 +3,7 @@
 from heapq import heapify, heappop, heappush
 
 from fe_models.foundation.arrays import IntArray
+from floatframe.engine.compiling.bodies import integers, offsets
 from floatframe.engine.kernels.model import Elimination
 from floatframe.engine.kernels.records import filled
 
@@ -66,14 +67,14 @@ def plan_elimination(sizes: list[int], ends_of_bodies: list[list[int]], connecti
         lower=lower,
         width=width,
         n_store=n_store,
-        pair0=first_of([[(a, b) for a in ends for b in ends] for ends in ends_of_bodies]),
+        pair0=offsets(integers([len(ends) ** 2 for ends in ends_of_bodies])),
         pair_row=[a for a, _ in pairs],
         pair_column=[b for _, b in pairs],
         pair_block=[first for first, _ in pair_blocks],
         pair_stride=[stride for _, stride in pair_blocks],
-        after0=first_of([later[j] for j in order]),
+        after0=offsets(integers([len(later[j]) for j in order])),
         after=[i for j in order for i in later[j]],
-        run0=first_of(runs),
+        run0=offsets(integers([len(of_row) for of_row in runs])),
         run=[first for of_row in runs for first, _, _ in of_row],
         run_stride=[stride for of_row in runs for _, stride, _ in of_row],
         run_length=[length for of_row in runs for _, _, length in of_row],
@@ -113,11 +114,3 @@ def joined_runs(blocks: list[tuple[int, int, int]]) -> list[tuple[int, int, int]
         else:
             runs.append((first, stride, length))
     return runs
-
-
-def first_of(lists: list[list]) -> list[int]:
-    """Return the index of the first entry of each list in their concatenation, and its length."""
-    first = [0]
-    for each in lists:
-        first.append(first[-1] + len(each))
-    return first

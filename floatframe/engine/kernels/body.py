@@ -69,7 +69,7 @@ __all__ = [
 
 
 class NewtonWeights(NamedTuple):
-    """NewtonWeights of a Newton matrix: changes of accelerations, velocities and positions by its unknowns."""
+    """Weights of a Newton matrix: changes of accelerations, velocities and positions by its unknowns."""
 
     c_m: float  #: of the mass
     c_d: float  #: of the damping

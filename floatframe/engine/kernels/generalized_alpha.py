@@ -527,14 +527,21 @@ def newton_weights(order, h):
     return NewtonWeights((1 - order.alpha_m) / (1 - order.alpha_f), order.gamma * h, order.beta * h * h)
 
 
+@small
+def has_states(model):
+    """Whether force elements or laws have unknowns of their own."""
+    return model.states.row.shape[0] + model.laws.equation.shape[0] > 0
+
+
 @inner
 def keeps_connections(model, work, h):
     """Whether a step of size h begins with the factors of the connections of the step before.
 
     With states they are renewed at the second iterate in any case, which suffices after a step that converged fast.
     """
-    has_states = model.states.row.shape[0] + model.laws.equation.shape[0] > 0
-    return has_states and work.solver.is_due == 0 and abs(work.state.time - h - work.solver.t_end) <= SAME_TIME * h
+    return (
+        has_states(model) and work.solver.is_due == 0 and abs(work.state.time - h - work.solver.t_end) <= SAME_TIME * h
+    )
 
 
 @inner
@@ -559,7 +566,6 @@ def one_step(model, work, memory, order, h):
     holds = order.stabilized != 0 and solver.mu.shape[0] > 0
     mass = total_mass(model)
     least_gap = SAFE * wanted / math.sqrt(mass) if mass > 0.0 else 0.0  # all bodies are within the limit
-    has_states = model.states.row.shape[0] + model.laws.equation.shape[0] > 0
     is_new, is_aged, first_of_rates = not keeps_connections(model, work, h), False, 0.0
     for iteration in range(order.max_iterations):
         evaluate(model, work, c_k)
@@ -616,7 +622,7 @@ def one_step(model, work, memory, order, h):
         excess = norm / allowed if allowed > 0.0 else math.inf
         is_new = False
         of_states = 0.0
-        if has_states:  # states follow the bodies by one iteration
+        if has_states(model):  # states follow the bodies by one iteration
             of_states = correction_of_states(model, work, c_k) / order.tolerance
             if not math.isfinite(of_states):
                 work.solver.is_due, work.solver.has_late_gaps = 1, 0

@@ -192,9 +192,7 @@ def slopes_of(measured: Measured, small: SmallMotions) -> tuple[dict[str, Rows],
     return columns, [name for k, name in enumerate(names) if not is_smooth[k]]
 
 
-def derivatives(
-    values: Callable[[IntArray, Array], Array], scales: Array, n_columns: int
-) -> tuple[Array, Array]:  # fmt: skip
+def derivatives(values: Callable[[IntArray, Array], Array], scales: Array, n_columns: int) -> tuple[Array, Array]:
     """Return the derivatives of columns by variables, (n_columns, n), and which columns have them, (n_columns,).
 
     Parameters

@@ -42,7 +42,7 @@ class ModalSpectra:
     scale
         Factor on the loads; spectra are multiplied by its square.
     weights
-        NewtonWeights of integrals over the frequencies, (n_f,) [Hz]; None: trapezoidal rule.
+        Weights of integrals over the frequencies, (n_f,) [Hz]; None: trapezoidal rule.
     """
 
     name: str

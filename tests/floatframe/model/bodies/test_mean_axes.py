@@ -10,7 +10,9 @@ from scipy.spatial.transform import Rotation
 
 import cms
 import fe_models as fm
-from floatframe import FlexibleBody
+from floatframe import FlexibleBody, RigidBody, System
+from floatframe.engine.compiling.file_frames import changed
+from floatframe.engine.compiling.system import compiled_system
 from floatframe.model.bodies.marker_shape import interface_shape
 from floatframe.model.bodies.mean_axes import FrameMotion, mean_axes, place_of_point, turn_of_mean_axes
 from floatframe.model.rotations import euler_parameter_product, euler_parameters_of_rotation_vector, rotation_matrix
@@ -181,6 +183,42 @@ def test_only_a_stiffened_body_in_another_frame_is_moved_in_mean_axes(bodies):
     one, two = FlexibleBody("one", bodies["root"]), FlexibleBody("two", bodies["root"])
     assert one.moved is two.moved
     assert one.moved.frame.kind == "tisserand"
+
+
+def test_bodies_of_one_file_are_converted_each_by_its_own_motion(bodies):
+    """Three of two files, with another frame and a rigid body between them, over three times."""
+    rng = np.random.default_rng(3)
+    parts = [
+        FlexibleBody("a", bodies["root"]),
+        RigidBody("b", 1.0, np.eye(3)),
+        FlexibleBody("c", bodies["Buckens"]),
+        FlexibleBody("d", bodies["mean"]),
+        FlexibleBody("e", bodies["root"]),
+    ]
+    compiled = compiled_system(System(parts, []))
+    n_q = compiled.model.bodies.n_q
+    motions = [moving(n, rng) for n in n_q]
+    own = [[at(t) for t in (0.0, 0.1, 0.2)] for at in motions]
+
+    def rows(of_bodies):
+        """Return r, p, q, u, u_dot of all bodies over time."""
+        lines = [
+            (
+                [m.r for m in each], [m.p for m in each], np.concatenate([m.q for m in each]),
+                np.concatenate([np.concatenate([m.v, m.omega, m.q_dot]) for m in each]),
+                np.concatenate([np.concatenate([m.v_dot, m.omega_dot, m.q_ddot]) for m in each]),
+            )
+            for each in zip(*of_bodies, strict=True)
+        ]  # fmt: skip
+        return tuple(np.array(part) for part in zip(*lines, strict=True))
+
+    for way in ("to_file", "to_mean"):
+        alone = [
+            motion if axes is None else [getattr(axes, way)(now) for now in motion]
+            for axes, motion in zip(compiled.mean_axes, own, strict=True)
+        ]
+        for found, expected in zip(changed(compiled, rows(own), way), rows(alone), strict=True):
+            assert_allclose(found, expected, rtol=0, atol=ROUNDOFF)
 
 
 def test_a_product_of_euler_parameters_turns_as_the_product_of_the_matrices():
