@@ -269,8 +269,8 @@ LIMITS: dict[str, Limit] = {
     # Measured modes against a model --------------------------------------------------------------------------------
     "test-partners": Limit(
         "share of the measured modes without a partner in the model", 0.0, 0.99,
-        "compare the shape with the likest one of the model: a point may be placed wrongly, a part of the model be "
-        "missing, or the window of the pairs be too narrow",
+        "compare the shape with the most similar one of the model; possible causes are a misplaced point, a missing "
+        "part of the model, and too narrow a window for pairs",
     ),
     "test-frequency": Limit(
         "frequencies of the model against the test", 0.02, 0.05,
@@ -278,7 +278,7 @@ LIMITS: dict[str, Limit] = {
     ),
     "test-mac": Limit(
         "measured shapes that the model does not have (1 - MAC)", 0.1, 0.3,
-        "look at the points with the least COMAC: a sensor may be rotated or exchanged, or the model wrong there",
+        "look at the points with the least COMAC: a sensor may be rotated or exchanged, or the model is wrong there",
     ),
     "test-orthogonality": Limit(
         "coupling of two measured shapes by the mass of the model", 0.1, None,

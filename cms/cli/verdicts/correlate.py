@@ -98,7 +98,7 @@ def print_parameters(update: "Update") -> None:
         (p.path, f"{p.start:.6g}", f"{v:.6g}", f"{100 * s:.2g}", f"{100 * told:.0f}")
         for p, v, s, told in zip(u.parameters, u.values, u.spread, u.determined, strict=True)
     ]
-    print_table("Updated", ("parameter", "start>", "updated>", "spread %>", "told by the test %>"), rows)
+    print_table("Updated", ("parameter", "start>", "updated>", "spread %>", "from the test %>"), rows)
     if not u.is_converged:
         say("the update did not converge; look at the parameters that the test does not tell")
 

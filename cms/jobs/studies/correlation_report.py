@@ -100,8 +100,8 @@ def pairs_section(result: CorrelationResult) -> Section:
                 graded(1 - pair.mac, LIMITS["test-mac"], f"{pair.mac:.3f}"),
             ]
         else:
-            likest = int(np.argmax(c.mac[k]))
-            note = f"likest: {likest + 1}, {hertz(c.model.frequencies[likest])} Hz, MAC {c.mac[k, likest]:.2f}"
+            nearest = int(np.argmax(c.mac[k]))
+            note = f"most similar: {nearest + 1}, {hertz(c.model.frequencies[nearest])} Hz, MAC {c.mac[k, nearest]:.2f}"
             cells += [Cell("none", "n fail", note), *[Cell("\u2013", "n blank")] * 3]
         if result.update is not None:
             cells.append(Cell(signed_percent(float(before[k])) if k in before else "\u2013", "n"))
@@ -177,7 +177,7 @@ def update_section(update: Update) -> Section:
                  Cell(f"\u00b1 {100 * spread:.2g} %", "n"), Cell(f"\u00b1 {100 * p.spread:.2g} %", "n"),
                  graded(1 - float(told), DETERMINED, f"{100 * told:.0f} %")]  # fmt: skip
         rows.append(cells)
-    headings = ["parameter", "start>", "updated>", "change>", "spread after>", "before>", "told by the test>"]
+    headings = ["parameter", "start>", "updated>", "change>", "spread after>", "before>", "from the test>"]
     n = len(update.parameters)
     pairs = [f"{update.parameters[i].name} and {update.parameters[j].name} ({update.correlation[i, j]:+.2f})"
              for i in range(n) for j in range(i) if abs(update.correlation[i, j]) > 0.9]  # fmt: skip
