@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from math import ceil
 
 import numpy as np
 import scipy.linalg as la
@@ -25,7 +24,8 @@ from floatframe.errors import FloatframeError
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.state import State
 from floatframe.model.system import System
-from floatframe.simulation.step_advice import FOLLOWED, SEEN, frequency_words, knot_words
+from floatframe.simulation.integrate import checked_times, number_of_steps
+from floatframe.simulation.step_advice import FOLLOWED, SEEN, step_warnings
 
 __all__ = ["SystemVibrations", "check_system", "system_vibrations"]
 
@@ -94,12 +94,13 @@ def check_system(
             if found is not None and h is not None:
                 records.append(step_record(system, found, h, has_fixed_steps=has_fixed_steps))
     if t_end is not None and h is not None:
-        n_steps = max(1, ceil(t_end / h * (1 - 1e-12)))
-        missed = [*frequency_words(system, 0.0, h, n_steps, has_steps_of_one_size=has_fixed_steps)]
-        missed += knot_words(system, 0.0, h, n_steps)
-        records += [
-            record("function of time", "Functions of time", "warn", words, "change h or the table") for words in missed
-        ]
+        try:
+            _, t_end, h = checked_times(0.0, t_end, h)
+            n_steps = number_of_steps(0.0, t_end, h)
+        except FloatframeError as error:
+            records.append(record("step", "Step size", "fail", str(error)))
+        else:
+            records += warning_records(system, t_end, n_steps, has_fixed_steps=has_fixed_steps)
     records += [body_record(body, system) for body in system.bodies if isinstance(body, FlexibleBody)]
     return tuple(records)
 
@@ -279,6 +280,17 @@ def step_record(system: System, found: SystemVibrations, h: float, *, has_fixed_
     verdict: Verdict = "pass" if followed or not has_fixed_steps else "warn"
     action = f"take h = {1 / (FOLLOWED * f[0]):.2g} {second} or less, or leave the step to error_tolerance"
     return record("step", "Step size", verdict, words, action, float(steps[0]), FOLLOWED)
+
+
+def warning_records(system: System, t_end: float, n_steps: int, *, has_fixed_steps: bool) -> list[QualityRecord]:
+    """Return a record for each message about the step size with which the run begins."""
+    found = step_warnings(system, 0.0, t_end / n_steps, n_steps, has_steps_of_one_size=has_fixed_steps)
+    return [
+        record("body modes", "Step size and modes of bodies", "warn", words, "take a smaller h")
+        if kind == "modes"
+        else record("function of time", "Functions of time", "warn", words, "change h or the table")
+        for kind, words in found
+    ]
 
 
 def body_record(body: FlexibleBody, system: System) -> QualityRecord:

@@ -54,7 +54,7 @@ from floatframe.simulation.law_watch import LawWatch
 from floatframe.simulation.motion_head import head_of, joint_rows
 from floatframe.simulation.restart import RESTART_STEPS, memory_of_record, restart_record, system_digest
 from floatframe.simulation.sampling import Sampling
-from floatframe.simulation.step_advice import frequency_words, knot_words, step_advice
+from floatframe.simulation.step_advice import step_advice, step_warnings
 from floatframe.simulation.step_watch import WATCHES, StepWatch
 from floatframe.simulation.validity_watch import ValidityWatch
 
@@ -187,15 +187,10 @@ def integrate(
     system = system if sampling is None else sampling.system
     if abs(step - h) > 1e-9 * h:
         log.info("h = %g does not divide the time from %g to %g: h = %.9g is used", h, t_start, t_end, step)
-    advice = step_advice(system, step)
-    if advice is not None and advice.n_followed == 0:
-        log.warning("system %r: %s", system.name, advice.words)
-    is_fixed = has_fixed_steps(integrator)
-    frequencies = frequency_words(system, t_start, step, n_total, has_steps_of_one_size=is_fixed)
-    acting = [ValidityNote.of_law("knots", words, t_start) for words in knot_words(system, t_start, step, n_total)]
-    acting += [ValidityNote.of_law("frequency", words, t_start) for words in frequencies]
-    for note in acting:
-        log.warning("system %r: %s", system.name, note.words)
+    warnings = step_warnings(system, t_start, step, n_total, has_steps_of_one_size=has_fixed_steps(integrator))
+    for _, words in warnings:
+        log.warning("system %r: %s", system.name, words)
+    acting = [ValidityNote.of_law(kind, words, t_start) for kind, words in warnings if kind != "modes"]
     head = head_of(system, integrator, t_start, t_end, step, output_every)
     head = replace(head, angles=compiled_system(system).angles, run=dict(head.run) | {"watch": watch})
     events = EventWatch(system, head) if has_events(system) else None

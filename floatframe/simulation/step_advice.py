@@ -13,7 +13,7 @@ from floatframe.engine.kernels.model import MASS, STIFFNESS
 from floatframe.model.system import System
 from floatframe.simulation.jumps import jump_times
 
-__all__ = ["StepAdvice", "frequency_words", "knot_words", "step_advice"]
+__all__ = ["StepAdvice", "frequency_words", "knot_words", "step_advice", "step_warnings"]
 
 FOLLOWED = 20.0  #: steps per period at which generalized-alpha reproduces the period of a mode within about 1 %
 N_PLACES = 2000  #: number of times in a run at which varying frequencies are evaluated
@@ -79,6 +79,24 @@ def step_advice(system: System, h: float) -> StepAdvice | None:
         fastest_body=owners[fastest][0],
         fastest_mode=owners[fastest][1],
     )
+
+
+def step_warnings(
+    system: System, t_start: float, h: float, n_steps: int, *, has_steps_of_one_size: bool = True
+) -> tuple[tuple[str, str], ...]:
+    """Return all that is doubtful about the step size before a run: (kind, message).
+
+    The kinds are "modes" (steps of one size that resolve no mode of a body), "frequency" and "knots".
+    """
+    found = [("knots", words) for words in knot_words(system, t_start, h, n_steps)]
+    found += [
+        ("frequency", words)
+        for words in frequency_words(system, t_start, h, n_steps, has_steps_of_one_size=has_steps_of_one_size)
+    ]
+    advice = step_advice(system, h)
+    if has_steps_of_one_size and advice is not None and advice.n_followed == 0:
+        found.insert(0, ("modes", advice.words))
+    return tuple(found)
 
 
 def frequency_words(

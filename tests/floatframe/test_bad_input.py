@@ -19,6 +19,7 @@ from floatframe import (
     integrate,
 )
 from floatframe.analyses import consistent_state
+from floatframe.analyses.system_check import check_system
 from floatframe.components.mechanisms import slider_crank
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import ConvergenceError, ModelError
@@ -154,6 +155,20 @@ def test_a_step_size_that_follows_no_mode_is_noted_and_one_that_fails_is_advised
     assert "follows" not in caplog.text
     with pytest.raises(ConvergenceError, match=r"h = 0.5 resolves 0 of 3 modes .* the slowest mode needs h = 0.01"):
         integrate(vibrating(), GeneralizedAlpha(max_iterations=2), 1.0, 0.5)
+
+
+def test_a_check_says_of_a_step_what_the_run_says(caplog):
+    system = vibrating()
+    integrate(system, GeneralizedAlpha(), 0.1, 0.049)  # three steps of 1/30
+    by_name = {each.name: each for each in check_system(system, t_end=0.1, h=0.049)}
+    assert by_name["body modes"].verdict == "warn"
+    assert f"system 'system': {by_name['body modes'].reason}" in caplog.messages
+    with pytest.raises(ModelError) as refused:
+        integrate(system, GeneralizedAlpha(), 0.1, 0.4)
+    last = [each for each in check_system(system, t_end=0.1, h=0.4) if each.name == "step"][-1]
+    assert (last.verdict, last.reason) == ("fail", str(refused.value))
+    names = [each.name for each in check_system(system, t_end=0.1, h=0.049, has_fixed_steps=False)]
+    assert "body modes" not in names
 
 
 def test_a_mode_without_mass_and_stiffness_is_named():
