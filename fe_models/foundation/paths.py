@@ -8,10 +8,11 @@ import stat
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from difflib import get_close_matches
 from glob import escape
 from pathlib import Path
 
-from fe_models.foundation.words import damage, nearest
+from fe_models.foundation.words import damage, did_you_mean
 
 __all__ = [
     "bytes_of", "file_digest", "file_identity", "file_state", "is_stream", "near_file", "reading", "remove_parts",
@@ -25,13 +26,12 @@ STANDARD = {"/dev/stdout": 1, "/dev/stderr": 2}
 def near_file(path: Path) -> str:
     """Return the end of a message about a missing file: the most similar name in its folder.
 
-    A file that is described in TOML, such as the job that names a mesh, does not replace a file of another kind.
+    A file of TOML, such as the job that names a mesh, is proposed for a suffix like its own (.tmol), or for none.
     """
     if not path.parent.is_dir():
         return f"; the folder {path.parent} does not exist"
-    there = [p.name for p in path.parent.iterdir() if p.suffix != ".toml" or path.suffix == ".toml"]
-    hint = nearest(path.name, there)
-    return hint.split("? ")[0] + "?" if "did you mean" in hint else ""
+    wants_toml = not path.suffix or bool(get_close_matches(path.suffix.lower(), [".toml"]))
+    return did_you_mean(path.name, [p.name for p in path.parent.iterdir() if wants_toml or p.suffix != ".toml"])
 
 
 def bytes_of(

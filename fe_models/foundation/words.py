@@ -1,5 +1,6 @@
 """Texts for messages: lists of choices, and the choice that was probably meant."""
 
+import re
 from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 from typing import TYPE_CHECKING
@@ -7,9 +8,11 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from fe_models.foundation.arrays import Array
 
-__all__ = ["damage", "is_number", "nearest", "node_list", "number_list", "quoted", "shortened"]
+__all__ = ["damage", "did_you_mean", "is_number", "nearest", "node_list", "number_list", "quoted", "shortened"]
 
 LONGEST = 80  #: largest number of characters of a name or value in a message
+MOST_MEANT = 3  #: largest number of names that may have been meant
+WORD_GAP = re.compile(r"[-_ .]")  #: between the words of a name
 MOST_CHOICES = 40  #: largest number of names in a message
 
 
@@ -18,13 +21,27 @@ def nearest(name: str, choices: Iterable[str]) -> str:
     names = sorted(str(choice) for choice in choices)
     if not names:
         return "; there are no choices"
-    # the cost of a comparison grows with the square of the length
-    short = [choice for choice in names if len(choice) <= 2 * LONGEST]
-    close = get_close_matches(str(name)[: 2 * LONGEST], short, n=1)
-    hint = f"; did you mean {quoted(close[0])}?" if close else ";"
+    hint = did_you_mean(name, names) or ";"
     shown = [shortened(choice) for choice in names[:MOST_CHOICES]]
     more = f" and {len(names) - MOST_CHOICES} more" if len(names) > MOST_CHOICES else ""
     return f"{hint} choices: {', '.join(shown)}{more}"
+
+
+def did_you_mean(name: str, choices: Iterable[str]) -> str:
+    """Return "; did you mean 'X' or 'Y'?" for an unknown name, or "" if no choice is similar.
+
+    First come the choices that contain the name as a word (force: point-force, user-force), then the most similar one,
+    then those that begin with the name.
+    """
+    # the cost of a comparison grows with the square of the length
+    short = [choice for choice in sorted(map(str, choices)) if len(choice) <= 2 * LONGEST]
+    asked = str(name)[: 2 * LONGEST]
+    found = [choice for choice in short if asked and asked.lower() in WORD_GAP.split(choice.lower())]
+    found = found or get_close_matches(asked, short, n=1)
+    found = found or [choice for choice in short if len(asked) > 2 and choice.lower().startswith(asked.lower())]
+    found = get_close_matches(asked, found, n=MOST_MEANT, cutoff=0.0)
+    *others, last = [quoted(choice) for choice in found] or [""]
+    return f"; did you mean {', '.join(others)}{' or ' if others else ''}{last}?" if last else ""
 
 
 def shortened(text: str, longest: int = LONGEST) -> str:

@@ -4,10 +4,11 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
-from fe_models.foundation.paths import file_state, is_stream, replace_file, same_file
+from fe_models.foundation.paths import file_state, is_stream, near_file, replace_file, same_file
 from tests.root import ROOT
 
 
@@ -71,3 +72,11 @@ def test_a_changed_file_of_the_same_size_and_time_is_noticed(tmp_path):
     os.utime(path, ns=(found.st_atime_ns, found.st_mtime_ns))
     assert path.stat().st_mtime_ns == found.st_mtime_ns
     assert file_state(path) != before
+
+
+def test_a_missing_file_of_toml_is_proposed_for_a_suffix_like_its_own(tmp_path):
+    for name in ("arm.msh", "arm.toml", "swing.h5"):
+        (tmp_path / name).touch()
+    proposed = {name: near_file(Path(tmp_path / name)) for name in ("arm.tmol", "arm.mesh", "arms.toml")}
+    words = "; did you mean {!r}?".format
+    assert proposed == {"arm.tmol": words("arm.toml"), "arm.mesh": words("arm.msh"), "arms.toml": words("arm.toml")}
