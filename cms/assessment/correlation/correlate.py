@@ -37,6 +37,7 @@ __all__ = [
 # Sources: Allemang (2003) for MAC and COMAC, O'Callahan, Avitabile and Riemer (1989) for the mass at the measured rows.
 
 
+MOVING = 0.05  #: motion of a row over all pairs, as a share of the largest, below which it has no COMAC
 LEAST_MAC = 0.5
 WINDOW = 0.5  #: largest frequency difference between partners, divided by the measured frequency
 
@@ -101,12 +102,16 @@ def pair_modes(
 def comac(A: Array, B: Array) -> Array:
     """Return the coordinate MAC of paired shapes at each row, (n_rows,): (Σ |a b|)² / (Σ a² Σ b²).
 
-    Shapes are first scaled to unit length, so that every pair has equal weight. Rows without motion have the value 1.
+    Shapes are first scaled to unit length, so that every pair has equal weight. Rows whose motion over the pairs, in A
+    and in B, is below `MOVING` of the largest hold noise, and have the value NaN.
     """
     a, b = A / np.linalg.norm(A, axis=0), B / np.linalg.norm(B, axis=0)
-    size = (a * a).sum(axis=1) * (b * b).sum(axis=1)
+    of_a, of_b = (a * a).sum(axis=1), (b * b).sum(axis=1)
+    moves = np.maximum(of_a / of_a.max(), of_b / of_b.max()) >= MOVING**2
     product = np.abs(a * b).sum(axis=1) ** 2
-    return np.asarray(np.divide(product, size, out=np.ones(len(a)), where=size > 1e-24))
+    size = of_a * of_b
+    values = np.divide(product, size, out=np.zeros(len(a)), where=size > 0)
+    return np.where(moves, values, np.nan)
 
 
 def scale_factors(measured: Array, computed: Array) -> Array:
@@ -167,7 +172,7 @@ class Correlation(Tabular):
     mac: Array  #: MAC of measured and computed modes, (n_t, n_m)
     auto_mac: Array  #: MAC of the test with itself, (n_t, n_t); shows modes that its points do not distinguish
     pairs: tuple[ModePair, ...]
-    comac: Array  #: COMAC of each measured row over the pairs, (n_rows,); empty without pairs
+    comac: Array  #: COMAC of each measured row over the pairs, (n_rows,), NaN without motion; empty without pairs
     #: orthogonality of the paired measured shapes in the mass of the model, (n, n); None: unknown
     orthogonality: Array | None
     cross_orthogonality: Array | None  #: orthogonality of the paired measured shapes to their partners, (n, n)
@@ -220,12 +225,12 @@ class Correlation(Tabular):
         return (*found, judge("test-orthogonality", off[k, j], f"largest coupling {off[k, j]:.3f}, of {modes}"))
 
     def point_comac(self) -> list[tuple[int, str, float]]:
-        """Return point, node and the smallest COMAC over the directions, worst point first."""
+        """Return point, node and the smallest COMAC over its moving directions, worst point first."""
         if not self.comac.size:
             return []
-        least = [float(self.comac[self.measured.points == point].min()) for point in self.points.points]
-        rows = list(zip(self.points.points.tolist(), self.points.nodes, least, strict=True))
-        return sorted(rows, key=lambda row: row[2])
+        least = [np.fmin.reduce(self.comac[self.measured.points == point]) for point in self.points.points]
+        rows = zip(self.points.points.tolist(), self.points.nodes, map(float, least), strict=True)
+        return sorted((row for row in rows if not np.isnan(row[2])), key=lambda row: row[2])
 
     def as_dict(self) -> dict[str, Any]:
         """Return all results in plain types; modes are counted from 1."""

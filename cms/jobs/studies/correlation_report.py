@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from cms.assessment.correlation.correlate import Correlation
+from cms.assessment.correlation.correlate import MOVING, Correlation
 from cms.assessment.correlation.update import Update
 from cms.assessment.quality.limits import LIMITS, Limit
 from cms.assessment.quality.record import worst
@@ -161,7 +161,8 @@ def points_section(c: Correlation) -> Section:
         return Section("points", "Points", (Paragraph("No modes are paired.", "notice"),))
     lead = (
         "COMAC of each point over all pairs, the least of its directions, worst first: a sensor that is rotated, "
-        "exchanged or wrongly scaled, or a place where the model is wrong."
+        "exchanged or wrongly scaled, or a place where the model is wrong. Directions are left out whose motion in "
+        f"test and model is below {100 * MOVING:g} % of the largest."
     )
     return Section("points", "Points", (TextTable(["point>", "node>", "COMAC>"], rows),), lead)
 
