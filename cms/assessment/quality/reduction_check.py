@@ -1,5 +1,6 @@
 """All checks of a mode set and its reduced body against the full model."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -39,7 +40,10 @@ from cms.reduction.basis.free_basis import FreeBasis, free_basis
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.tall.columns import of_this_process
 
-__all__ = ["basis_records", "check_reduction", "require_same_units"]
+__all__ = ["basis_records", "check_reduction", "require_same_units", "with_default_band"]
+
+#: origin of the band of a comparison for which nobody gave one
+DEFAULT_BAND = "this band is the default, to the last vibration mode divided by 1.5; set another with --band or band="
 
 
 def check_reduction(
@@ -95,16 +99,10 @@ def check_reduction(
         modes = replace(modes, columns=columns)
     if reference is None:
         with FullReference(body, band=usable_band(modes, reduced)) as made:
-            return check_reduction(
-                body,
-                modes,
-                reduced,
-                reference=made,
-                uncoupled=uncoupled,
-                snapshots=snapshots,
-                own=own,
-                options=options,
+            found = check_reduction(
+                body, modes, reduced, reference=made, uncoupled=uncoupled, snapshots=snapshots, own=own, options=options
             )
+        return with_default_band(found)
     if reference.body is not body:
         raise QualityError(f"check: the reference belongs to another body than {body.name!r}")
     found = check_body(reduced) if own is None else own
@@ -130,6 +128,14 @@ def check_reduction(
     if snapshots is not None:
         records.append(deformation_record(deformation_error(body, basis, snapshots)))
     return tuple(records)
+
+
+def with_default_band(records: Iterable[QualityRecord]) -> tuple[QualityRecord, ...]:
+    """Return the records of a comparison without a given band; "frequency-error" says how its band was chosen."""
+    return tuple(
+        replace(each, reason=f"{each.reason}; {DEFAULT_BAND}") if each.name == "frequency-error" else each
+        for each in records
+    )
 
 
 def basis_records(reference: Reference, basis: FreeBasis, *others: QualityRecord) -> list[QualityRecord]:

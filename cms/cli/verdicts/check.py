@@ -44,7 +44,7 @@ def check_against(
     reduced: ReducedBody, path: Path, band: float | None, changes: Mapping[str, Any]
 ) -> tuple[QualityRecord, ...]:
     """Check a reduced body against the full model and the mode set of a job, with one factorisation."""
-    from cms.assessment.quality.reduction_check import check_reduction, require_same_units
+    from cms.assessment.quality.reduction_check import check_reduction, require_same_units, with_default_band
     from cms.assessment.quality.reference.full_reference import FullReference, usable_band
     from cms.cli.console import stages
     from cms.jobs.body_of_job import coupled_body, uncoupled_body
@@ -64,7 +64,8 @@ def check_against(
             top = usable_band(modes, reduced) if band is None else band
             with clock("compare"), FullReference(families, band=top) as reference:
                 options = reduction_options(job, body)
-                return check_reduction(body, modes, reduced, reference=reference, uncoupled=uncoupled, options=options)
+                found = check_reduction(body, modes, reduced, reference=reference, uncoupled=uncoupled, options=options)
+    return with_default_band(found) if band is None else found
 
 
 def quality_report(reduced: ReducedBody, records: Sequence[QualityRecord]) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from cms.assessment.quality.of_body.effective_mass import EffectiveMass, can_be_
 from cms.assessment.quality.of_reduction.frequencies import compare_shapes, frequency_records, mac
 from cms.assessment.quality.of_reduction.mass_properties import check_mass_properties
 from cms.assessment.quality.record import QualityRecord, has_failed, information, judge
-from cms.assessment.quality.reduction_check import check_reduction, require_same_units
+from cms.assessment.quality.reduction_check import check_reduction, require_same_units, with_default_band
 from cms.assessment.quality.reference.full_reference import FullReference, usable_band
 from cms.body.modal_file.file import digest as digest_of
 from cms.body.modal_file.file import read
@@ -106,6 +106,7 @@ def accept(
     if full.job is not None:
         job = read_job(Path(full.job), full.changes)
         records, compared = against_job(job, Path(full.job), reduced, own, band, stages)
+        records = with_default_band(records) if band is None else records
         if job.body.deck is not None:
             left_out = cards_left_out(parse_deck(job.body.deck))
     elif full.deck is not None:
@@ -114,6 +115,7 @@ def accept(
         with stages("full model"):
             body = body_of_deck(deck, full, reduced)
         records = (*own, *compare_with_model(body, reduced, band=band or band_of(reduced)))
+        records = with_default_band(records) if band is None else records
         compared = f"the deck {full.deck}, {body.n_dof} dofs, its supports removed"
     elif (deck_path := reduced.provenance.get("deck")) and Path(deck_path).is_file():
         left_out = cards_left_out(parse_deck(Path(deck_path)))

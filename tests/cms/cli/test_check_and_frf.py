@@ -71,6 +71,10 @@ def test_with_its_job_a_file_is_compared_with_the_full_model(folder):
     told = {record["name"]: record for record in json.loads(result.stdout)["records"]}
     assert result.exit_code == 0, told
     assert told["frequency-error"]["data"]["band_hz"] == 10000
+    assert "default" not in told["frequency-error"]["reason"]
+    shown = run_cms("check", folder / "bar.h5", "--job", *job, "--json").stdout
+    told_by_default = {record["name"]: record for record in json.loads(shown)["records"]}
+    assert "this band is the default" in told_by_default["frequency-error"]["reason"]
     assert told["same-body"]["verdict"] == told["frequency-response"]["verdict"] == "pass"
     assert "interface-stiffening" in told
 

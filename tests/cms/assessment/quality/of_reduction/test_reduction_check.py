@@ -388,7 +388,11 @@ def test_modes_at_the_ends_of_a_beam_are_found_over_all_of_it(frame):
 
 def test_the_default_band_is_the_highest_kept_mode_over_one_and_a_half(body):
     modes = craig_bampton(body, n_modes=6)
-    assert_allclose(usable_band(modes, reduce(body, modes)), modes.frequencies[-1] / 1.5, rtol=1e-12)
+    reduced = reduce(body, modes)
+    assert_allclose(usable_band(modes, reduced), modes.frequencies[-1] / 1.5, rtol=1e-12)
+    by_name = {each.name: each for each in check_reduction(body, modes, reduced)}
+    assert "this band is the default" in by_name["frequency-error"].reason
+    assert "--band" in by_name["frequency-error"].reason
 
 
 def test_checks_refuse_what_does_not_belong_together(body, reference):
