@@ -165,8 +165,8 @@ def multilevel_modes(
     tolerance
         Largest relative error of a frequency. If larger errors remain after `MOST_STEPS` steps, a warning reports them.
     cutoff_factor
-        A larger factor keeps more substructure modes and needs fewer steps (6). None: 20 for shells and beams, 14 if
-        there are at most 400 interior dofs per wanted mode, 4 for solids.
+        A larger factor keeps more substructure modes and needs fewer steps (6). None: 4 for solids; for shells and
+        beams 20, or 14 if a number of modes is wanted that is at least 1/400 of the interior dofs.
     tasks
         Workers that eliminate subtrees; None: threads of this process.
     rows
@@ -257,7 +257,7 @@ def multilevel_modes(
 
 
 def _factor(interior: Interior, wanted: ModeCount) -> float:
-    """Return the cutoff factor for shells and beams, whose nodes have rotations, or for solids."""
+    """Return the cutoff factor for solids; for shells and beams, whose nodes have rotations; and for many modes."""
     n = len(interior.nodes)
     if n <= 4.5 * len(np.unique(interior.nodes)):
         return SOLID

@@ -56,7 +56,8 @@ def multilevel(
         Largest relative error of a frequency, 1e-10 to 0.1; a warning names the frequencies with a larger error.
     cutoff_factor
         Substructures keep their modes up to this factor times the cutoff, or times the highest wanted frequency; 1.2 or
-        more. None: 20 for shells and beams, 14 if there are at most 400 interior dofs per wanted mode, 4 for solids.
+        more. None: 4 for solids; for shells and beams 20, or 14 if `n_modes` is a number and at least 1/400 of the
+        interior dofs (many modes: then fewer substructure modes are enough).
     workers
         Workers that eliminate subtrees: number of processes, dask, or dask://host:port; None: threads of this process.
 
