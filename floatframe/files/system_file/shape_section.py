@@ -11,10 +11,17 @@ from floatframe.files.system_file.described import DescribedSection, OneOf, Sign
 from floatframe.files.system_file.keys import Positive
 from floatframe.model.shapes import GEOMETRIES, Shape
 from floatframe.model.shapes.mesh import mesh_file
+from floatframe.model.shapes.shape import COLORS
 
 __all__ = ["ShapeSection"]
 
-PLACE = keys_of_fields(Shape, ("geometry",))  #: keys of the place and colour of a shape
+#: keys of the place and colour of a shape
+PLACE = keys_of_fields(Shape, ("geometry",)) | {
+    "color": (
+        str | None,
+        Field(None, description=f'"#rrggbb" or one of {", ".join(COLORS)}; default: that of its kind or its body'),
+    )
+}
 SurfaceFile = Annotated[Path, BeforeValidator(existing_file("surface such as an .stl file"))]
 #: keys of a mesh, instead of nodes and triangles
 OF_FILE = {

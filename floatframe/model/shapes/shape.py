@@ -17,8 +17,8 @@ from floatframe.model.shapes.piece import Piece, shifted
 __all__ = ["Geometry", "Shape", "shape_tuple"]
 
 COLOR = re.compile(r"#[0-9a-fA-F]{6}")
-#: colour names that may be used
-NAMED = {
+#: colours with a name
+COLORS = {
     "steel": "#9aa7b3", "aluminium": "#c3cad0", "dark": "#3b4249", "black": "#24272b", "white": "#eef0f1",
     "red": "#c4473a", "orange": "#d98a3d", "yellow": "#d9b84a", "green": "#5f9a63",
     "blue": "#4a7fb5", "gold": "#c7a24a",
@@ -46,9 +46,7 @@ class Shape:
     #: position of its origin [m] in axes of the body (flexible: of its mesh), the interface, or the ground
     position: Array = field(default_factory=lambda: np.zeros(3))
     rotation_vector: Array = field(default_factory=lambda: np.zeros(3))  #: rotation relative to these axes, (3,) [rad]
-    #: colour "#rrggbb", or steel, aluminium, dark, black, white, red, orange, yellow, green, blue or gold; None: the
-    #: default for its kind, else for its body
-    color: str | None = None
+    color: str | None = None  #: colour "#rrggbb" or a name in `COLORS`; None: the default for its kind or its body
     opacity: float = 1.0  #: opacity, above 0 and at most 1
     interface: str | None = None  #: interface of a flexible body that carries the shape; None: the body frame
 
@@ -77,10 +75,10 @@ class Shape:
 
 def color_of(text: str) -> str:
     """Return "#rrggbb" for a colour; raise `ModelError` if it is invalid."""
-    if text in NAMED:
-        return NAMED[text]
+    if isinstance(text, str) and text in COLORS:
+        return COLORS[text]
     if not isinstance(text, str) or not COLOR.fullmatch(text):
-        raise ModelError(f'shape: color: expected "#rrggbb" or one of {", ".join(NAMED)}, got {text!r}')
+        raise ModelError(f'shape: color: expected "#rrggbb" or a name, got {quoted(text)}{nearest(str(text), COLORS)}')
     return text.lower()
 
 

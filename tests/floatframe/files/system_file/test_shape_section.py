@@ -75,7 +75,7 @@ def test_tables_become_shapes(tmp_path):
         ),
         (("width = 0.2\n", ""), r"width: missing; expected a number: .*width of the .* \(line 9\)"),
         (('type = "wheel"', 'type = "whel"'), "did you mean 'wheel'"),
-        (('color = "red"', 'color = "rde"'), "#rrggbb"),
+        (('color = "red"', 'color = "rde"'), "#rrggbb.*got 'rde'; did you mean 'red'"),
         (('color = "red"', 'interface = "rim"'), "there is no interface 'rim'; it has none"),
         (("part.stl", "none.stl"), "no such file"),
         (("scale = 0.001", "scale = -0.001"), r"shapes.1.scale = -0.001: expected a factor above 0 .* \(line 19\)"),
