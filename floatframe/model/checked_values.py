@@ -37,9 +37,9 @@ def number(where: str, value: Any, *, at_least: float | None = None, above: floa
     if not np.isfinite(result):
         raise ModelError(f"{where}: expected a finite number, got {result}")
     if at_least is not None and result < at_least:
-        raise ModelError(f"{where}: expected a number >= {at_least:g}, got {result:g}")
+        raise ModelError(f"{where}: expected a number of {at_least:g} or more, got {result:g}")
     if above is not None and result <= above:
-        raise ModelError(f"{where}: expected a number > {above:g}, got {result:g}")
+        raise ModelError(f"{where}: expected a number above {above:g}, got {result:g}")
     return result
 
 

@@ -51,7 +51,7 @@ def test_instances_of_one_reduced_body_share_its_data():
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"mass": -1.0}, "mass: expected a number > 0, got -1"),
+        ({"mass": -1.0}, "mass: expected a number above 0, got -1"),
         ({"mass": float("nan")}, "mass: expected a finite number"),
         ({"inertia": np.diag([1.0, 1.0, 3.0])}, "no mass distribution has the principal moments 1, 1, 3"),
         ({"inertia": np.zeros((3, 3))}, "give a point mass a small extent"),
@@ -94,7 +94,7 @@ def test_joints_at_places_that_are_not_there_are_refused(joints, words):
     ("force", "words"),
     [
         (lambda: SpringDamper("s", Marker("bob"), Marker(GROUND)), "expected stiffness, damping or preload above zero"),
-        (lambda: SpringDamper("s", Marker("bob"), Marker(GROUND), -1.0), "stiffness: expected a number >= 0"),
+        (lambda: SpringDamper("s", Marker("bob"), Marker(GROUND), -1.0), "stiffness: expected a number of 0 or more"),
         (lambda: PointForce("f", Marker("bob"), (0, np.inf, 0)), "force: expected finite numbers"),
         (lambda: Gravity((0, 0)), r"gravity: expected shape \(3,\)"),
         (

@@ -69,7 +69,7 @@ def path_of(
     placed_speed, point = float(np.linalg.norm(v)), start.r[i].copy()
     speed = placed_speed if speed is None else float(speed)
     if not (np.isfinite(speed) and speed >= 0):
-        raise ModelError(f"steady_motion: speed: expected a number of at least 0, got {speed}")
+        raise ModelError(f"steady_motion: speed: expected a number of 0 or more, got {speed}")
     if speed > 0 and placed_speed == 0:
         raise ModelError(
             f"steady_motion: body {name!r} is placed without a velocity perpendicular to the axis {axis.tolist()}; "

@@ -103,11 +103,11 @@ class Cylinder:
         if self.head is None and self.rod is None:
             raise ModelError(f"{where}: expected a node for head or rod or both, got none")
         if self.rod is not None and self.rod_area == 0:
-            raise ModelError(f"{where}: rod_area: expected a number > 0 for the chamber {self.rod!r}, got 0")
+            raise ModelError(f"{where}: rod_area: expected a number above 0 for the chamber {self.rod!r}, got 0")
         for side in ("head", "rod"):
             if getattr(self, side) is not None and getattr(self, f"{side}_dead_volume") == 0:
                 raise ModelError(
-                    f"{where}: {side}_dead_volume: expected a number > 0, got 0: a chamber without volume at the "
+                    f"{where}: {side}_dead_volume: expected a number above 0, got 0: a chamber without volume at the "
                     "end of its stroke is infinitely stiff; 1 % of the swept volume is usual"
                 )
 
@@ -248,7 +248,9 @@ class Supply:
         if not isinstance(self.pressure, TimeFunction):
             number(f"component {self.name!r}: pressure", self.pressure, above=0.0)
         elif (self.pressure.pieces[:, 1:].any(axis=1) == 0).all() and (self.pressure.pieces[:, 0] <= 0).any():
-            raise ModelError(f"component {self.name!r}: pressure: expected absolute pressures > 0, got zero or less")
+            raise ModelError(
+                f"component {self.name!r}: pressure: expected absolute pressures above 0, got zero or less"
+            )
         checked(self, functions=("pressure",))
 
 

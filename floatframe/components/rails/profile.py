@@ -127,7 +127,7 @@ def profile_of_points(
     where = f"profile {name!r}"
     y, z = checked_points(where, kind, y, z)
     if noise is not None and not (np.isfinite(noise) and noise >= 0):
-        raise ModelError(f"{where}: noise: expected a number >= 0 [m], got {noise}")
+        raise ModelError(f"{where}: noise: expected a number of 0 or more [m], got {noise}")
     grid = np.linspace(y[0], y[-1], max(5, int(np.ceil((y[-1] - y[0]) / spacing)) + 1))
     # in millimetres, in which the normal equations of the smoothing spline are better scaled
     if noise == 0:

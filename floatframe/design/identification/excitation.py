@@ -145,7 +145,8 @@ def exciting_motion(
     bounds = [checked(name, limits, names) for name in names]
     if not period > 0 or n_harmonics < 1 or n_instants < 2 * n_harmonics + 1:
         raise ModelError(
-            f"exciting_motion: expected period > 0, n_harmonics >= 1 and at least {2 * n_harmonics + 1} instants, got "
+            "exciting_motion: expected period above 0, n_harmonics of 1 or more and at least "
+            f"{2 * n_harmonics + 1} instants, got "
             f"period = {period}, n_harmonics = {n_harmonics}, n_instants = {n_instants}"
         )
     t = np.arange(n_instants) * period / n_instants

@@ -370,7 +370,7 @@ def test_a_folder_that_is_not_there_is_refused_before_the_run(tmp_path):
 def test_impossible_arguments_are_refused():
     with pytest.raises(ModelError, match=r"t_end above t_start"):
         integrate(SYSTEM, METHOD, -1.0, 1e-3)
-    with pytest.raises(ModelError, match=r"h: expected a number > 0"):
+    with pytest.raises(ModelError, match=r"h: expected a number above 0"):
         integrate(SYSTEM, METHOD, 1.0, 0.0)
     with pytest.raises(ModelError, match="finite"):
         integrate(SYSTEM, METHOD, float("nan"), 1e-3)

@@ -204,7 +204,7 @@ def test_what_a_sensor_cannot_find_is_named(swing, sensor, words):
         (lambda: PlaceSensor("s", TIP, "speed"), "quantity: expected one of position, velocity"),
         (lambda: StressSensor("s", "rod"), "either a position or a stress point"),
         (lambda: StrainGauge("s", "rod", (0, 0, 0), 1.0, 0.3, position=(0, 0, 0)), "direction: expected a direction"),
-        (lambda: StrainGauge("s", "rod", (1, 0, 0), 0.0, 0.3, position=(0, 0, 0)), "young: expected a number > 0"),
+        (lambda: StrainGauge("s", "rod", (1, 0, 0), 0.0, 0.3, position=(0, 0, 0)), "young: expected a number above 0"),
         (lambda: ReactionSensor("s", "pin", "body"), "axes: expected one of ground, marker"),
         (lambda: swing_system(EnergySensor("e"), EnergySensor("e")), "'e' is used twice"),
         (

@@ -145,7 +145,7 @@ def test_tangent_is_exact_and_the_law_is_right(kind):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"radial_play": 0.0}, "radial_play: expected a number > 0"),
+        ({"radial_play": 0.0}, "radial_play: expected a number above 0"),
         ({"stiffness": -1.0}, "stiffness"),
         ({"exponent": 0.5}, "exponent"),
         ({"length": -1.0}, "length"),

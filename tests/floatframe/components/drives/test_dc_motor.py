@@ -92,7 +92,7 @@ def test_an_angle_is_held_over_many_turns_as_by_an_independent_model():
         ({"voltage": 1.0, "controller": Pid(1.0, 1.0)}, "expected a voltage or a controller, got both"),
         ({"controller": Pid(1.0, 1.0), "controlled": "sped"}, "expected one of speed, angle, current, got 'sped'"),
         ({"voltage": "on"}, "voltage: expected a number, got 'on'"),
-        ({"voltage": 1.0, "inductance": 0.0}, "inductance: expected a number > 0, got 0"),
+        ({"voltage": 1.0, "inductance": 0.0}, "inductance: expected a number above 0, got 0"),
     ],
 )
 def test_a_motor_that_cannot_be_is_refused(options, message):

@@ -140,8 +140,8 @@ def test_the_tangent_of_a_strut_is_exact(oil_volume):
             "gas_volume: expected more than gas_area times stroke = 0.00128, got 0.001",
         ),
         ({"area": monotone_table([0.0, 0.3], [1e-4, -1e-5])}, "area: expected areas above 0 over the stroke, got -"),
-        ({"charge": -6e5}, "element 'strut': charge: expected a number > 0, got -600000"),
-        ({"recoil_area": 0.0}, "recoil_area: expected a number > 0, got 0"),
+        ({"charge": -6e5}, "element 'strut': charge: expected a number above 0, got -600000"),
+        ({"recoil_area": 0.0}, "recoil_area: expected a number above 0, got 0"),
     ],
 )
 def test_a_strut_that_cannot_be_is_refused(options, message):

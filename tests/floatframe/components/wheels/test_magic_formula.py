@@ -290,11 +290,11 @@ def test_the_file_is_converted_into_units_of_the_system(tyres, version, name):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"pressure": -1.0}, "pressure: expected a number > 0"),
+        ({"pressure": -1.0}, "pressure: expected a number above 0"),
         ({"side": "up"}, "expected one of left, right"),
         ({"convention": "sae"}, "expected one of iso, adapted-sae"),
         ({"relaxation_x": 0.3}, "relaxation_x and relaxation_y, or neither"),
-        ({"low_speed": 0.0}, "low_speed: expected a number > 0"),
+        ({"low_speed": 0.0}, "low_speed: expected a number above 0"),
     ],
 )
 def test_numbers_out_of_their_range_are_refused(tyres, changes, message):

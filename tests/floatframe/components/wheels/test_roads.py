@@ -198,7 +198,7 @@ def test_a_given_coherence_is_that_of_the_tracks():
         (lambda: wheels.step(1.0, 0.1, length=3.0).road(), "increasing numbers"),
         (lambda: wheels.step(4.0, 0.1, length=3.0), "a position on the road"),
         (lambda: wheels.Polyline([0, 2, 1], [0, 0, 0]), "corners in the order of x"),
-        (lambda: wheels.step(1.0, 0.1, length=3.0).enveloped(-1.0), "radius: expected a number > 0"),
+        (lambda: wheels.step(1.0, 0.1, length=3.0).enveloped(-1.0), "radius: expected a number above 0"),
         (lambda: wheels.iso_8608_road("K", 10.0, seed=1), "expected one of A, B"),
         (lambda: wheels.iso_8608_road("A", 10.0, seed=1, spacing=0.5), "does not resolve waves"),
         (lambda: wheels.iso_8608_road("A", 10.0, seed=1, band=(1.0, 0.5)), "lowest < highest"),

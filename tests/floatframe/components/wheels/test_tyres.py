@@ -146,14 +146,14 @@ def test_steady_slip_loses_force_times_slip_velocity(make):
 @pytest.mark.parametrize(
     ("make", "changes", "message"),
     [
-        (linear, {"stiffness": 0.0}, "stiffness: expected a number > 0"),
-        (linear, {"relaxation_y": -0.1}, "relaxation_y: expected a number >= 0"),
+        (linear, {"stiffness": 0.0}, "stiffness: expected a number above 0"),
+        (linear, {"relaxation_y": -0.1}, "relaxation_y: expected a number of 0 or more"),
         (linear, {"friction": np.nan}, "friction: expected a finite number"),
         (linear, {"axis": (0, 0, 0)}, "axis: expected a direction"),
         (linear, {"road": "flat"}, "expected a FlatRoad or a GridRoad"),
-        (linear, {"landing_depth": 0.0}, "landing_depth: expected a number > 0"),
-        (brush, {"contact_length": 0.0}, "contact_length: expected a number > 0"),
-        (brush, {"nominal_load": -1.0}, "nominal_load: expected a number > 0"),
+        (linear, {"landing_depth": 0.0}, "landing_depth: expected a number above 0"),
+        (brush, {"contact_length": 0.0}, "contact_length: expected a number above 0"),
+        (brush, {"nominal_load": -1.0}, "nominal_load: expected a number above 0"),
     ],
 )
 def test_numbers_out_of_their_range_are_refused(make, changes, message):

@@ -124,7 +124,7 @@ def test_energy_is_kept_with_added_masses():
 @pytest.mark.parametrize(
     ("part", "words"),
     [
-        (lambda: AddedMass("end_a", 0.0), "mass: expected a number > 0"),
+        (lambda: AddedMass("end_a", 0.0), "mass: expected a number above 0"),
         (lambda: AddedMass("end_a", 1.0, inertia=np.diag([1.0, 1.0, 3.0])), "no mass distribution has the principal"),
         (lambda: AddedMass("end_a", 1.0, inertia=np.triu(np.ones((3, 3)))), "expected a symmetric tensor"),
         (lambda: AddedMass("end_x", 1.0), "no interface 'end_x'"),

@@ -65,7 +65,7 @@ def test_parts_sum_to_the_whole():
         (lambda: mass_properties(1.0, (2, 0, 0), np.eye(3), reference=(0, 0, 0)), "negative principal moment"),
         (lambda: mass_properties(1.0, (0, 0, 0), np.eye(3), axes=2 * np.eye(3)), "orthonormal"),
         (lambda: combined(), "at least one part"),
-        (lambda: point_mass(0.0, (0, 0, 0)), "mass: expected a number > 0"),
+        (lambda: point_mass(0.0, (0, 0, 0)), "mass: expected a number above 0"),
         (lambda: with_modes(reduced_body(POINTS, stiffness(4)), [4]), "modes 0 to 3"),
         (lambda: with_modes(reduced_body(POINTS, stiffness(4)), [1, 1]), "each to be named once"),
         (lambda: without_modes(reduced_body(POINTS, stiffness(4)), [7]), "modes 0 to 3"),

@@ -174,7 +174,7 @@ def test_a_prescribed_coordinate_takes_no_force():
     ("make", "words"),
     [
         (lambda: JointForce("f", "hub", "angle"), "at least one part above zero"),
-        (lambda: JointForce("f", "hub", "angle", damping=-1.0), "damping: expected a number >= 0"),
+        (lambda: JointForce("f", "hub", "angle", damping=-1.0), "damping: expected a number of 0 or more"),
         (lambda: JointForce("f", "hub", "angle", motor=np.sin), "motor: expected a function of"),
         (lambda: BodyLoad("f", "wheel", "wind", np.sin), "amplitude: expected a number or a function"),
         (lambda: PointForce("f", Marker("b"), amplitude=2.0), "amplitude: expected a function"),

@@ -145,11 +145,11 @@ def test_a_bouncing_ball_keeps_its_restitution_at_every_impact():
     [
         ({}, "expected either modulus .* or stiffness, got neither"),
         ({"modulus": 1.0, "stiffness": 1.0}, "got both"),
-        ({"stiffness": 1.0, "restitution": 0.0}, "restitution: expected a number > 0"),
+        ({"stiffness": 1.0, "restitution": 0.0}, "restitution: expected a number above 0"),
         ({"stiffness": 1.0, "restitution": 1.2}, "restitution: expected 0 < e <= 1"),
         ({"stiffness": 1.0, "dissipation": "newton"}, "dissipation: expected one of exact"),
         ({"modulus": 1.0, "exponent": 2.0}, "exponent: expected 3/2"),
-        ({"stiffness": 1.0, "friction": -1.0}, "friction: expected a number >= 0"),
+        ({"stiffness": 1.0, "friction": -1.0}, "friction: expected a number of 0 or more"),
     ],
 )
 def test_impossible_contacts_are_refused(options, words):

@@ -84,7 +84,7 @@ def test_kernels_know_the_same_function(name):
         (lambda: table([0, 1], [0, 0]), "four or more times"),
         (lambda: sampled(lambda t: float(t > 0.3), 0.0, 1.0, 1e-3), "it jumps"),
         (lambda: TimeFunction([0.0], [[1.0]]), r"expected n times"),
-        (lambda: cycloidal_spin_up(1.0, 0.0), "duration: expected a number > 0"),
+        (lambda: cycloidal_spin_up(1.0, 0.0), "duration: expected a number above 0"),
     ],
 )
 def test_impossible_functions_are_refused(make, words):

@@ -201,7 +201,7 @@ def test_driven_joints_follow_their_motion_and_tell_the_torque():
         (lambda: RevoluteJoint("j", GROUND, Marker("b"), motions={"turn": 1.0}), "no coordinate 'turn'; choices"),
         (lambda: RevoluteJoint("j", GROUND, Marker("b"), motions={"angle": np.sin}), "can be sampled with"),
         (lambda: ScrewJoint("j", GROUND, Marker("b"), lead=0.0), "lead: expected a number other than zero"),
-        (lambda: DistanceJoint("j", GROUND, Marker("b"), distance=-1.0), "distance: expected a number > 0"),
+        (lambda: DistanceJoint("j", GROUND, Marker("b"), distance=-1.0), "distance: expected a number above 0"),
     ],
 )  # fmt: skip
 def test_impossible_joints_are_refused(make, words):
