@@ -1,7 +1,8 @@
 """What `python -m benchmarks` keeps of its runs: figures, those of the last run beside them, and a page of both.
 
 A benchmark takes part by a function `figures(short: bool) -> dict[str, float]` in its module. A name that ends in a
-unit  but for names that end in "speedup" or "saving".
+unit in brackets belongs to this machine, the others are ratios. Smaller is better, but for names that end in "speedup"
+or "saving".
 """
 
 import ast
@@ -14,6 +15,8 @@ import sys
 from dataclasses import asdict, dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+
+from benchmarks.aims import AIMS, Aim
 
 FOLDER = Path(__file__).parent
 ROOT = FOLDER.parent
@@ -178,6 +181,21 @@ def shown(value: float | None) -> str:
     return f"{value:.3g}" if value == 0 or 1e-3 <= abs(value) < 1000 else f"{value:.2e}"
 
 
+def aims_table(now: Results, aims: tuple[Aim, ...]) -> list[str]:
+    """Return the lines of the table of aims: figures of this run, and why aims are missed."""
+    lines = ["## Aims", "", "| figure | now | aim | |", "|---|---|---|---|"]
+    for aim in aims:
+        value = now.figures.get(aim.module, {}).get(aim.name)
+        if value is None:
+            told = "not measured"
+        elif aim.is_met(value, more_is_better=aim.name.endswith(MORE_IS_BETTER)):
+            told = "reached"
+        else:
+            told = f"**missed**: {aim.reason}"
+        lines.append(f"| {aim.name} (`{aim.module}`) | {shown(value)} | {shown(aim.value)} | {told} |")
+    return [*lines, ""]
+
+
 def page(now: Results, last: Results | None) -> str:
     """Return the page of figures."""
     told = changes(now, last)
@@ -189,6 +207,7 @@ def page(now: Results, last: Results | None) -> str:
         f"Last: {last.date}, commit `{last.commit}`, load {last.load:.1f}." if last else "There was no run before.",
         "Libraries: " + ", ".join(f"{name} {now.machine[name]}" for name in ("Python", *PACKAGES)) + ".",
         "",
+        *aims_table(now, AIMS),
     ]
     for module in now.figures:
         lines += [f"## {title(module).rstrip('.')}", "", f"`benchmarks/{module}.py`, {now.seconds[module]:.0f} s", ""]

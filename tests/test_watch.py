@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks import watch
+from benchmarks.aims import Aim
 from benchmarks.watch import Change, Results
 
 
@@ -49,6 +50,16 @@ def test_the_page_tells_both_runs_and_names_what_became_worse():
     assert "| a over b | 1.5 | 1 | +50 % **regression** |" in rows
     assert "| a step [µs] | 12 | – |  |" in rows
     assert "- `shells`: no module named x" in rows
+
+
+def test_the_page_tells_which_aims_are_missed_and_why(monkeypatch):
+    aims = tuple(Aim("recursive", name, 2.0, "slow") for name in ("a over b", "c, speedup", "d", "e, speedup"))
+    monkeypatch.setattr(watch, "AIMS", aims)
+    rows = watch.page(results(**{"a over b": 1.5, "c, speedup": 1.5, "e, speedup": 2.5}), None).splitlines()
+    told = {row.split(" (")[0].strip("| "): row.rsplit("| ", 1)[1] for row in rows if "`recursive`)" in row}
+    assert told == {
+        "a over b": "reached |", "c, speedup": "**missed**: slow |", "d": "not measured |", "e, speedup": "reached |",
+    }  # fmt: skip
 
 
 def test_quoted_figures_are_renewed_with_their_decimals(tmp_path, monkeypatch):
