@@ -88,14 +88,15 @@ def step_warnings(
 
     The kinds are "modes" (steps of one size that resolve no mode of a body), "frequency" and "knots".
     """
-    found = [("knots", words) for words in knot_words(system, t_start, h, n_steps)]
+    advice = step_advice(system, h)
+    found = []
+    if has_steps_of_one_size and advice is not None and advice.n_followed == 0:
+        found.append(("modes", advice.words))
+    found += [("knots", words) for words in knot_words(system, t_start, h, n_steps)]
     found += [
         ("frequency", words)
         for words in frequency_words(system, t_start, h, n_steps, has_steps_of_one_size=has_steps_of_one_size)
     ]
-    advice = step_advice(system, h)
-    if has_steps_of_one_size and advice is not None and advice.n_followed == 0:
-        found.insert(0, ("modes", advice.words))
     return tuple(found)
 
 
