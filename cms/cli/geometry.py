@@ -240,9 +240,9 @@ def show(part: "CadPart", faces: "Iterable[CadFace]") -> None:
         where = face.normal if face.normal is not None else face.axis
         rows.append((
             str(face.number), words, f"{face.area:.6g}", vector_words(face.centre, size),
-            "" if where is None else vector_words(where, 1.0), face.name, face.colour,
+            "" if where is None else vector_words(where, 1.0), face.colour,
         ))  # fmt: skip
-    columns = ("face>", "what it is", f"area [{symbol}²]>", f"centre [{symbol}]", "normal or axis", "name", "colour")
+    columns = ("face>", "what it is", f"area [{symbol}²]>", f"centre [{symbol}]", "normal or axis", "colour")
     print_table("Faces", columns, rows)
 
 
@@ -273,7 +273,6 @@ def record(part: "CadPart", faces: "Iterable[CadFace]") -> dict[str, Any]:
                 "hole": face.is_hole,
                 "lo": face.lo.tolist(),
                 "hi": face.hi.tolist(),
-                "name": face.name or None,
                 "colour": face.colour or None,
                 "solids": list(face.solids),
             }

@@ -52,8 +52,6 @@ class CadFace:
         Point on the axis of a cylinder nearest to the centroid, or centre of a sphere, (3,).
     is_hole
         Whether the material is outside of a cylinder or sphere.
-    name
-        Name in the file.
     colour
         Colour in the file, "#rrggbb".
     solids
@@ -72,7 +70,6 @@ class CadFace:
     axis: Array | None = None
     point: Array | None = None
     is_hole: bool | None = None
-    name: str = ""
     colour: str = ""
     solids: tuple[int, ...] = ()
 
@@ -135,7 +132,6 @@ def _face(
         axis=axis,
         point=None if point is None else point / scale,
         is_hole=is_hole,
-        name=gmsh.model.getEntityName(2, tag).rpartition("/")[2],
         colour=f"#{red:02x}{green:02x}{blue:02x}" if alpha else "",
         solids=solids,
     )

@@ -161,8 +161,6 @@ def _name_groups(model: CadModel, selectors: tuple[str, ...]) -> None:
     for face in part.faces:
         if not face.is_inner:
             groups[2, f"face {face.number}"] = [face.tag]
-            if face.name:
-                groups.setdefault((2, _plain(face.name)), []).append(face.tag)
     for text in selectors:
         if (2, text) not in groups:
             groups[2, text] = [face.tag for face in chosen_faces(text, part.faces)]

@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import ModuleType
 
 import numpy as np
@@ -139,6 +140,8 @@ def open_cad(path: str | Path, *, units: Units | str) -> Iterator[CadModel]:
     where = f"geometry {path}"
     with gmsh_model(path.stem, OPTIONS | {"Geometry.OCCTargetUnit": KERNEL_UNITS[model_unit]}) as gmsh:
         with gmsh_call(where, advice=f"is it a {kind} file, whole and of this kind?"):
+            if kind == "IGES":
+                _prepare_units(gmsh)
             shapes = gmsh.model.occ.importShapes(str(path))
             gmsh.model.occ.synchronize()
         if not gmsh.model.getEntities(3):
@@ -158,6 +161,17 @@ def open_cad(path: str | Path, *, units: Units | str) -> Iterator[CadModel]:
             hi=np.max([face.hi for face in faces], axis=0),
         )
         yield CadModel(gmsh, part, scale)
+
+
+def _prepare_units(gmsh: ModuleType) -> None:
+    """Read an empty IGES file: OpenCASCADE takes no target unit before its first reader."""
+    unit = gmsh.option.getString("Geometry.OCCTargetUnit")
+    gmsh.option.setString("Geometry.OCCTargetUnit", "")
+    with TemporaryDirectory(prefix="units-") as folder:
+        empty = Path(folder) / "empty.igs"
+        empty.touch()
+        gmsh.model.occ.importShapes(str(empty))
+    gmsh.option.setString("Geometry.OCCTargetUnit", unit)
 
 
 def _content(path: Path) -> bytes:

@@ -12,7 +12,7 @@ axis=z, axis=1,1,0          cylinders along this direction or opposite to it
 normal=-z, normal=0,0,1     planes with this outward normal
 x=10                        planes at this coordinate, cylinders whose axis and spheres whose centre is there
 x=0..10                     faces that lie completely in this range
-name=bore, colour=#ff0000   faces with that name or colour in the file
+colour=#ff0000              faces with that colour in the file; their names are lost in the reader of gmsh
 near=0,0,5                  of the faces that meet all other conditions, the one with the nearest centroid
 face 7                      number 7 in the list of faces
 box                         no condition; the word may introduce ranges
@@ -36,7 +36,7 @@ __all__ = ["KEYS", "chosen_faces", "face_words"]
 RADIUS = 1e-4  #: relative difference of radii up to which they are equal
 PLACE = 1e-5  #: difference of positions divided by the body size, up to which they are equal
 ANGLE = 1e-4  #: angle between directions up to which they are equal [rad]
-KEYS = ("r", "d", "axis", "normal", "x", "y", "z", "name", "colour", "color", "near", "face")
+KEYS = ("r", "d", "axis", "normal", "x", "y", "z", "colour", "color", "near", "face")
 WORDS = (*FACE_KINDS, "hole", "outside", "box", "face", *(f"{key}=" for key in KEYS if key != "face"))
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
@@ -117,6 +117,11 @@ def _parsed(text: str, slack: float) -> _Selector:
             tests.append(_is_number(text, value))
         elif is_pair and key == "near":
             near = np.array(_numbers(text, word, value, 3))
+        elif is_pair and key == "name":
+            raise InterfaceError(
+                f"faces {quoted(text)}: {quoted(word)}: no reader of CAD files gives the names of faces; "
+                "take a colour, a kind or a place, as cms faces lists them"
+            )
         elif is_pair and key in KEYS:
             tests.append(_condition(text, word, key, value, slack))
         elif not is_pair and key in FACE_KINDS:
@@ -150,8 +155,6 @@ def _is_number(text: str, value: str) -> Test:
 
 def _condition(text: str, word: str, key: str, value: str, slack: float) -> Test:
     """Return the test that a pair key=value describes."""
-    if key == "name":
-        return lambda face: face.name == value
     if key in ("colour", "color"):
         wanted = value.lower()
         if not re.fullmatch(r"#[0-9a-f]{6}", wanted):
