@@ -5,13 +5,15 @@ import os
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from cms.cli.console import guarded, print_table, say, stages
 from cms.cli.demo import environment
+from fe_models.foundation.stages import Stages
 
 __all__ = ["example_command", "prepare_command", "prepare_parts"]
 
@@ -70,30 +72,45 @@ def prepare_command(
     from floatframe.engine.kernels.compiler.choice import words
     from floatframe.errors import FloatframeError
 
-    began = time.perf_counter()
-    with stages() as clock, clock("compile"):
-        done = prepare_parts(tuple(PARTS), workers or os.cpu_count() or 1)
-    rows = [
-        (name, PARTS[name][0], f"compiled in {each['seconds']:.0f} s" if each.get("compiled") else "was ready")
-        for name, each in done.items()
-        if "failed" not in each
-    ]
-    print_table(f"Compiled code ({words()})", ("part", "for", "now"), rows)
-    say(f"{time.perf_counter() - began:.0f} s")
+    began, n_workers = time.perf_counter(), min(workers or os.cpu_count() or 1, len(PARTS))
+    say(f"compiling {len(PARTS)} parts ({words()}), {n_workers} at a time; this takes minutes")
+    with stages() as clock:
+        done = prepare_parts(tuple(PARTS), n_workers, clock=clock, tell=lambda part, words: say(f"{part:<10} {words}"))
+    say(f"done in {time.perf_counter() - began:.0f} s")
     failed = {name: each["failed"] for name, each in done.items() if "failed" in each}
     if failed:
         name, why = next(iter(failed.items()))
         raise FloatframeError(f"prepare: the code of {name!r} could not be compiled: {why}; the other parts are ready")
 
 
-def prepare_parts(parts: tuple[str, ...], workers: int) -> dict[str, dict]:
-    """Return the report of the process of each part, or its error; at most `workers` processes run at a time."""
+def prepare_parts(
+    parts: tuple[str, ...],
+    workers: int,
+    *,
+    clock: Stages | None = None,
+    tell: Callable[[str, str], None] = lambda part, words: None,
+) -> dict[str, dict]:
+    """Return the report of the process of each part, or its error; at most `workers` processes run at a time.
+
+    Parameters
+    ----------
+    clock
+        Shows a progress bar for each running part.
+    tell
+        Called with a part and what happened to it, when it begins and when it ends.
+    """
+    from floatframe.cli.compile_kernels import PARTS
+
+    clock = clock or Stages()
     waiting, running, done = list(parts), {}, {}  # type: ignore[var-annotated]
+    bars = {part: clock(part) for part in parts}
     try:
         while waiting or running:
             ready = [part for part in waiting if LATER.get(part) not in (*waiting, *running)]
             for part in ready[: workers - len(running)]:
                 waiting.remove(part)
+                tell(part, f"begins: {PARTS[part][0] if part in PARTS else part}")
+                bars[part].__enter__()
                 running[part] = subprocess.Popen(
                     [sys.executable, "-P", "-c", RUN, part], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                     stderr=subprocess.PIPE, text=True, env=environment(),
@@ -104,14 +121,23 @@ def prepare_parts(parts: tuple[str, ...], workers: int) -> dict[str, dict]:
                 except subprocess.TimeoutExpired:
                     continue
                 del running[part]
+                bars[part].__exit__(None, None, None)
                 lines = errors.strip().splitlines()
                 done[part] = (
                     json.loads(said.splitlines()[-1])
                     if process.returncode == 0
                     else {"failed": lines[-1] if lines else f"exit code {process.returncode}"}
                 )
+                tell(part, result_words(done[part]))
     finally:
         for process in running.values():
             process.kill()
             process.wait()
     return {part: done[part] for part in parts}
+
+
+def result_words(report: dict[str, Any]) -> str:
+    """Return what happened to a part."""
+    if "failed" in report:
+        return "failed"
+    return f"compiled in {report['seconds']:.0f} s" if report.get("compiled") else "was ready"

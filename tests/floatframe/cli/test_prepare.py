@@ -33,6 +33,15 @@ def test_a_part_that_needs_another_begins_when_that_is_done():
     assert done["reduction"]["at"] < done["motion"]["at"] + done["motion"]["seconds"]  # beside it
 
 
+def test_each_part_is_announced_and_says_what_happened_to_it():
+    told = []
+    prepare.prepare_parts(("relative", "motion", "broken"), 1, tell=lambda part, words: told.append((part, words)))
+    assert [part for part, _ in told] == ["motion", "motion", "relative", "relative", "broken", "broken"]
+    assert [words for _, words in told][:3] == [f"begins: {PARTS['motion'][0]}", "compiled in 0 s",
+                                                f"begins: {PARTS['relative'][0]}"]  # fmt: skip
+    assert [words for _, words in told][3:] == ["was ready", "begins: broken", "failed"]
+
+
 def test_a_part_that_fails_says_why_and_leaves_the_others():
     done = prepare.prepare_parts(("broken", "motion"), 1)
     assert done["broken"] == {"failed": "no compiler"}
