@@ -283,7 +283,7 @@ def test_a_number_fixes_a_coordinate(tmp_path):
         ("omega = 4", "", "omega: missing; expected a number: Angular speed"),
         ("omega = 4", "omega = 4\nphase = 1", 'phase: unknown key of type "cycloidal-spin-up"'),
         ("motions.angle", "motions.turn", "no coordinate 'turn'; choices: angle"),
-        ('"cycloidal-spin-up"', '"cycloid"', 'unknown type of motion; did you mean .cycloidal-spin-up.. choices'),
+        ('"cycloidal-spin-up"', '"cycloid"', "unknown type of motion; did you mean .cycloidal-spin-up.. choices"),
         ("duration = 1.0", "duration = 0", r"duration = 0: expected a number above 0, got 0 \(line 25\)"),
     ],
 )
