@@ -20,6 +20,9 @@ from fe_models.foundation.stages import Stages
 
 __all__ = ["job_at", "reduce_family"]
 
+FEWEST_BEYOND = 4  #: modes beyond the cutoff of a sample, or half the number of its modes if that is more
+BEYOND_CUTOFF = 10  #: modes beyond a cutoff frequency
+
 
 def reduce_family(
     path: Path | str,
@@ -70,5 +73,13 @@ def reduce_family(
 
 
 def job_at(path: str | os.PathLike[str], point: Mapping[str, float]) -> Job:
-    """Return the job with these values of its parameters."""
-    return read_job(path, {name: int(x) if float(x).is_integer() else float(x) for name, x in point.items()})
+    """Return the job of a sample: with these values of its parameters, and modes beyond the cutoff."""
+    job = read_job(path, {name: int(x) if float(x).is_integer() else float(x) for name, x in point.items()})
+    reduction = job.reduction
+    if reduction.beyond is None:
+        n = reduction.n_modes
+        n_beyond = max(FEWEST_BEYOND, n // 2) if isinstance(n, int) else BEYOND_CUTOFF
+        reduction = reduction.model_copy(update={"beyond": n_beyond})
+    if reduction.error_estimates is None:  # interpolated bodies have none
+        reduction = reduction.model_copy(update={"error_estimates": False})
+    return job.model_copy(update={"reduction": reduction})

@@ -206,8 +206,8 @@ class RecoveryTable(Tabular):
         Parameters
         ----------
         X
-            Transformation z = X z_new, (6 + n_q, 6 + n_q). It also holds for z_ddot, except for the term of the spin in
-            the acceleration of the origin, see `p`.
+            Transformation z = X z_new, (6 + n_q, 6 + n_new). It also holds for z_ddot, except for the term of the spin
+            in the acceleration of the origin, see `p`.
         R
             New axes as columns, in old axes, (3, 3).
         p

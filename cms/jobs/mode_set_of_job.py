@@ -13,9 +13,9 @@ from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.modes.families.families import Families, families_of
 from cms.modes.families.interface_loads import InterfaceLoad, condensed_load
 from cms.modes.mode_set import ModeSet
-from cms.modes.mode_sets import MODE_SETS
+from cms.modes.mode_sets import INTERFACE_SETS, MODE_SETS
 from cms.modes.mode_sets.characteristic_modes import with_characteristic_modes
-from cms.modes.mode_sets.extra_columns import EXTRA_COLUMNS
+from cms.modes.mode_sets.extra_columns import EXTRA_COLUMNS, with_modes_beyond
 from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.foundation.arrays import Array
 
@@ -49,31 +49,44 @@ def job_mode_set(body: FEBody | Families, reduction: ReductionSection) -> ModeSe
         body = families.body
         options = set_options(body, reduction)
         added = partial(with_additions, families, reduction)
-        if reduction.n_modes != AUTO:
-            return added(MODE_SETS[reduction.set](families, **options))
-        from cms.assessment.compare.mode_selection import select_modes
+        make, n_modes = partial(MODE_SETS[reduction.set], families), reduction.n_modes
+        n_beyond = reduction.beyond or 0 if reduction.set in (*INTERFACE_SETS, "normal") else 0
+        if n_beyond and isinstance(n_modes, int):  # first, so that the modes of the set are a part of these
+            make(**{**options, "n_modes": min(n_modes + n_beyond, max(n_modes, most_modes(body)))})
+        if n_modes != AUTO:
+            modes = added(make(**options))
+        else:
+            from cms.assessment.compare.mode_selection import select_modes
 
-        has_additions = reduction.extra or reduction.reduces_interfaces
-        return select_modes(
-            families,
-            set=reduction.set,
-            error=reduction.error or 0.0,
-            band=reduction.band or (0.0, 0.0),
-            measure=reduction.measure or "frequency",
-            options=options,
-            added=added if has_additions else None,
-        ).modes
+            has_additions = reduction.extra or reduction.reduces_interfaces
+            modes = select_modes(
+                families,
+                set=reduction.set,
+                error=reduction.error or 0.0,
+                band=reduction.band or (0.0, 0.0),
+                measure=reduction.measure or "frequency",
+                options=options,
+                added=added if has_additions else None,
+            ).modes
+        if not n_beyond or modes.is_static.all():
+            return modes
+        n = int(np.count_nonzero(~modes.is_static))
+        more = make(**{**options, "n_modes": min(n + n_beyond, max(n, most_modes(body)))})
+        return with_modes_beyond(modes, more)
+
+
+def most_modes(body: FEBody) -> int:
+    """Return the number of interior dofs; each multiplier of a distributing interface reduces them by one."""
+    return body.n_dof - len(body.b) - 2 * int((body.dofs[:, 1] == MULTIPLIER).sum())
 
 
 def reduction_of(job: Job, body: FEBody) -> ReductionSection:
     """Return the table [reduction]; for a part of a body, its number of modes is limited to the possible number.
 
-    The jobs of all parts of a body have the same number of modes, but a small part may have fewer interior dofs. Each
-    multiplier of a distributing interface reduces them by one.
+    The jobs of all parts of a body have the same number of modes, but a small part may have fewer interior dofs.
     """
-    n_i = body.n_dof - len(body.b) - 2 * int((body.dofs[:, 1] == MULTIPLIER).sum())
     asked = job.reduction.n_modes
-    if job.body.part is None or not isinstance(asked, int) or asked <= n_i:
+    if job.body.part is None or not isinstance(asked, int) or asked <= (n_i := most_modes(body)):
         return job.reduction
     log.warning(
         "part %d of the body: n_modes = %d, but it has %d interior dofs: it is reduced with %d modes",

@@ -277,6 +277,11 @@ class ReductionSection(Table):
     columns_over: choice("dofs", lambda: OVER) | None = Field(  # type: ignore[valid-type]
         None, description='"coupled" or "mesh": which dofs the rows of the columns are'
     )
+    beyond: Count | None = Field(
+        None,
+        description="a whole number, 0 or more, of vibration modes beyond the cutoff, of which the bodies of a family "
+        "take those that others have; cms family chooses it",
+    )
     extra: Extras | None = Field(None, description=f"a list of extra columns, of {', '.join(EXTRA_COLUMNS)}")
     interface_modes: Count | None = Field(
         None, description="a whole number, 0 or more, of modes of each all-node interface"

@@ -95,7 +95,7 @@ class Change:
     """Change to another body frame: the removed rigid motion, the new modes, and origin and axes of the new frame."""
 
     C: Array  #: rigid motion [d; theta] of each old shape about the old origin, old axes, (6, n_q)
-    Z: Array  #: new modes as combinations of the old ones, (n_q, n_q)
+    Z: Array  #: new modes as combinations of the old ones, (n_q, n_new)
     p: Array  #: new origin in the old frame, (3,) [m]
     R: Array  #: new axes as columns, in old axes, (3, 3)
 
@@ -296,8 +296,8 @@ def changed_moments(moments: Moments, change: Change) -> Moments:
     Missing terms stay missing. Removing a rotation from the shapes mixes 3C into 4C and 5C, which are then missing too.
     Mass, 1C, 2C and M* of the new frame follow from their old values alone.
     """
-    n = moments.n_q
-    L = np.zeros((4 + 3 * n, 4 + 3 * n))
+    n, n_old = change.Z.shape[1], moments.n_q
+    L = np.zeros((4 + 3 * n, 4 + 3 * n_old))
     L[0, 0] = 1.0
     L[1:4, 0], L[1:4, 1:4] = -change.R.T @ change.p, change.R.T
     # new shape k, component a: R_ba (phi_b - d_b - eps_bce theta_c c_e), multiplied by Z
@@ -306,7 +306,7 @@ def changed_moments(moments: Moments, change: Change) -> Moments:
     cross = -np.cross(np.eye(3)[:, None], off[3:].T[None])  # [e, k, b] = -(e_e × theta_k)_b = (theta_k × e_e)_b
     shapes[:, :, 0] = -change.R.T @ off[:3]
     shapes[:, :, 1:4] = -np.einsum("ba,ekb->ake", change.R, cross)
-    shapes[:, :, 4:] = np.einsum("ba,lk->akbl", change.R, change.Z).reshape(3, n, 3 * n)
+    shapes[:, :, 4:] = np.einsum("ba,lk->akbl", change.R, change.Z).reshape(3, n, 3 * n_old)
     missing = INERTIA_TERMS if "3C" in moments.missing else moments.missing
     return moments_from_gram(L @ moments.gram @ L.T, is_exact=moments.is_exact, missing=missing)
 
@@ -351,7 +351,7 @@ def changed_load_case(case: ReducedLoadCase, change: Change) -> ReducedLoadCase:
 
 def changed_table(table: RecoveryTable, change: Change) -> RecoveryTable:
     """Return recovery rows in the new frame, which follow from z = X z'' (docs/theory.md §11)."""
-    X = np.zeros((6 + table.n_q, 6 + table.n_q))
+    X = np.zeros((6 + table.n_q, 6 + change.Z.shape[1]))
     X[:6, :6] = six_motions(-change.p) @ np.kron(np.eye(2), change.R)  # d - theta × p, theta
     X[:6, 6:] = -change.C @ change.Z
     X[6:, 6:] = change.Z

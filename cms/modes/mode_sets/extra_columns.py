@@ -1,4 +1,4 @@
-"""Extra columns for any mode set: static responses to load cases and to steady rotation (residual vectors)."""
+"""Extra columns for any mode set: static responses to load cases and steady rotation, modes beyond the cutoff."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -14,10 +14,12 @@ from fe_models.body.fe_body import FEBody
 from fe_models.body.load_cases import LoadCase, load_columns
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.sparse.sparse_product import SymmetricProduct
-from fe_models.foundation.tall.columns import in_memory
+from fe_models.foundation.tall.columns import beside, in_memory
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["EXTRA_COLUMNS", "with_centrifugal", "with_load_cases"]
+__all__ = ["BEYOND", "EXTRA_COLUMNS", "with_centrifugal", "with_load_cases", "with_modes_beyond"]
+
+BEYOND = "beyond cutoff"  #: group of the columns of `with_modes_beyond`
 
 IN_THE_SPAN = 1e-6  #: part of a response outside the span, in the energy norm, below which the response is not added
 #: energy of a column relative to the sum of the energies of its single dofs, below which it is rigid-body motion
@@ -98,6 +100,27 @@ def with_centrifugal(modes: ModeSet, body: FEBody | Families) -> ModeSet:
             )
         cases = centrifugal_loads(body)
     return _with_responses(modes, source, cases, "")
+
+
+def with_modes_beyond(modes: ModeSet, more: ModeSet) -> ModeSet:
+    """Add the next vibration modes to a mode set, in a group of their own, which families of bodies recognise.
+
+    Parameters
+    ----------
+    modes
+        A mode set.
+    more
+        The same set with more vibration modes. Only these are taken: its static columns may differ.
+    """
+    new = [k for k, label in enumerate(more.labels) if not more.is_static[k] and label not in modes.labels]
+    return replace(
+        modes,
+        columns=beside(modes.columns, more.columns[:, new]),
+        labels=(*modes.labels, *(more.labels[k] for k in new)),
+        groups=(*modes.groups, *[BEYOND] * len(new)),
+        frequencies=np.concatenate([modes.frequencies, more.frequencies[new]]),
+        options={**modes.options, "modes beyond the cutoff": str(len(new))},
+    )
 
 
 EXTRA_COLUMNS: dict[str, Callable[..., ModeSet]] = {"load-cases": with_load_cases, "centrifugal": with_centrifugal}

@@ -36,6 +36,7 @@ FLAT = 1e-6  #: radius of gyration along an axis, relative to the largest, below
 
 CONVERTED = "frame converted from"  #: key of the provenance of bodies whose frame was converted
 VISIBLE = 1e-7  #: smallest singular value of the rows of all modes, relative to the largest, that alignment needs
+REMEDY = "Take samples at smaller distances, or more modes beyond the cutoff (beyond in [reduction])"
 LEAST_COSINE = 0.5  #: smallest cosine of the angles between the spaces of two samples, beyond which they do not match
 
 
@@ -74,8 +75,7 @@ def align(sample: ReducedBody, reference: ReducedBody, name: str, reference_name
         raise BodyError(
             f"parametric body: {name}: {np.count_nonzero(cosines < LEAST_COSINE)} of {sample.n_q} modes have no "
             f"counterpart in {reference_name}, first of all mode {k + 1}, {sample.labels[k]!r} (cosine "
-            f"{cosines[-1]:.2f}); expected the same modes in all samples. Take another n_modes, so that the highest "
-            "modes do not change places with those left out, or samples at smaller distances"
+            f"{cosines[-1]:.2f}); expected the same modes in all samples. {REMEDY}"
         )
     Q = left @ right
     scaled = recombined(sample, Q * np.sqrt(sample.moments.m))  # (4)
@@ -88,6 +88,12 @@ def align(sample: ReducedBody, reference: ReducedBody, name: str, reference_name
 
 def orthonormal_rows(name: str, body: ReducedBody) -> Array:
     """Return U of steps (1) and (2), (n_rows, n_q)."""
+    left, _, right = rows_of_shapes(name, body)
+    return np.asarray(left @ right)
+
+
+def rows_of_shapes(name: str, body: ReducedBody) -> tuple[Array, Array, Array]:
+    """Return the singular value decomposition of X of step (1): (n_rows, n_q), (n_q,), (n_q, n_q)."""
     points = np.concatenate([body.nodes, *(interface.position[None] for interface in body.interfaces)])
     size = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
     scale = np.array([1.0, 1, 1, size, size, size])[:, None]
@@ -101,13 +107,13 @@ def orthonormal_rows(name: str, body: ReducedBody) -> Array:
             f"parametric body: {name}: its kept nodes and interfaces distinguish only {n} of {body.n_q} modes; keep "
             "more nodes (keep in the table [body] of the job), or take fewer modes"
         )
-    return np.asarray(left @ right)
+    return left, sizes, right
 
 
 def recombined(body: ReducedBody, Z: Array) -> ReducedBody:
-    """Return the body over the shapes Phi Z, (n_q, n_q), which need not diagonalise K."""
+    """Return the body over the shapes Phi Z, (n_q, n_new), which need not diagonalise K."""
     change = Change(np.zeros((6, body.n_q)), Z, np.zeros(3), np.eye(3))
-    changed = changed_body(replace(body, geometric=None), body.frame, change, np.ones(body.n_q), None)
+    changed = changed_body(replace(body, geometric=None), body.frame, change, np.ones(Z.shape[1]), None)
     return replace(
         changed,
         M=Z.T @ body.M @ Z,

@@ -1,6 +1,7 @@
 """A reduced body as a function of one to three design parameters, interpolated between samples.
 
-(1) the samples are reduced bodies at the points of a grid, with the same mode set, frame, mesh and interfaces
+(1) the samples are reduced bodies at the points of a grid, with the same mode set, frame, mesh and interfaces, over
+    modes that all have in common (`common_modes`)
 (2) they are converted to mean axes, in which modes have no momentum. In another frame the mass of the free body is a
     small difference of large terms, which would be interpolated one by one
 (3) their modes are aligned with those of the sample in the middle, and scaled to the mass (`alignment`)
@@ -42,6 +43,7 @@ from cms.reduction.parametric.alignment import (
     rescaled,
 )
 from cms.reduction.parametric.blending import blended
+from cms.reduction.parametric.common_modes import has_modes_beyond, in_common_modes
 from cms.reduction.parametric.interpolation_errors import (
     InterpolationErrors,
     errors_between,
@@ -67,6 +69,7 @@ SAME_REDUCTION = {
     "mode set redundant": "columns dropped from the mode set",
     "mode set columns": "number of columns of the mode set",
 }
+OF_MODES = ("mode set columns",)  #: of these, what differs with the number of modes
 
 SAME_MODES = "Give n_modes a number instead of a cutoff or an error, and the same to all samples"
 SAME_MESH = "A parameter may move nodes, but not change their number: scale one mesh instead of meshing anew"
@@ -101,11 +104,7 @@ class ParametricBody:
         checked = {name: tuple(float(x) for x in given) for name, given in self.values.items()}
         object.__setattr__(self, "values", FrozenMapping(checked))
         object.__setattr__(self, "samples", tuple(self.samples))
-        if fault := fault_of_values(checked):
-            raise BodyError(f"parametric body: {fault}")
-        n = int(np.prod([len(given) for given in checked.values()]))
-        if len(self.samples) != n:
-            raise BodyError(f"parametric body: expected {n} samples, one at each point, got {len(self.samples)}")
+        checked_grid(checked, self.samples)
         require_same_reduction(self.samples, self.names)
         if self.errors is not None and len(self.errors.frequency) != self.samples[0].n_q:
             raise BodyError(
@@ -121,7 +120,7 @@ class ParametricBody:
     @property
     def points(self) -> list[dict[str, float]]:
         """Values of the parameters of each sample."""
-        return [dict(zip(self.values, point, strict=True)) for point in product(*self.values.values())]
+        return checked_grid(self.values, self.samples)
 
     @property
     def names(self) -> list[str]:
@@ -253,7 +252,16 @@ def parametric_body(
     BodyError
         If the samples have different modes, interfaces, meshes or dropped columns, or their modes cannot be aligned.
     """
-    made = ParametricBody({name: tuple(given) for name, given in values.items()}, tuple(samples))
+    points, bodies, center = checked_grid(values, samples), [*samples], middle_point(values)
+    if middle is not None:
+        points, bodies = [*points, center], [*bodies, middle]
+    if all(has_modes_beyond(each) for each in bodies):
+        names = [point_name(point) for point in points]
+        require_same_reduction(bodies, names, has_same_modes=False)
+        away = [sum(abs(point[name] - center[name]) for name in center) for point in points]
+        bodies = in_common_modes(bodies, names, int(np.argmin(away)))
+        middle = None if middle is None else bodies[-1]
+    made = ParametricBody({name: tuple(given) for name, given in values.items()}, tuple(bodies[: len(samples)]))
     aligned = tuple(replace(each, body=without_large_arrays(each.body)) for each in made._aligned)
     parts, methods = [], []
     for name, given in made.values.items():
@@ -276,6 +284,16 @@ def parametric_body(
         parts.append(errors_between(body, middle))
         methods.append(f"a reduction at {point_name(point)}")
     return replace(made, errors=replace(sum_of_errors(parts), method=" and ".join(methods)))
+
+
+def checked_grid(values: Mapping[str, Sequence[float]], samples: Sequence[ReducedBody]) -> list[dict[str, float]]:
+    """Return the points of the grid, the last parameter fastest; raise `BodyError` unless each has a sample."""
+    if fault := fault_of_values(values):
+        raise BodyError(f"parametric body: {fault}")
+    points = [dict(zip(values, point, strict=True)) for point in product(*values.values())]
+    if len(samples) != len(points):
+        raise BodyError(f"parametric body: expected {len(points)} samples, one at each point, got {len(samples)}")
+    return points
 
 
 def fault_of_values(values: Mapping[str, Sequence[float]]) -> str:
@@ -315,9 +333,14 @@ def with_rigid_members(body: ReducedBody) -> ReducedBody:
     return replace(body, Phi=Phi)
 
 
-def require_same_reduction(samples: Sequence[ReducedBody], names: Sequence[str]) -> None:
-    """Raise `BodyError` unless all samples have the same number of modes, mode set, columns and interfaces."""
-    first, of_reduction = samples[0], SAME_REDUCTION.items()
+def require_same_reduction(
+    samples: Sequence[ReducedBody], names: Sequence[str], *, has_same_modes: bool = True
+) -> None:
+    """Raise `BodyError` unless all samples have the same mode set and interfaces, and the same number of modes."""
+    first, of_reduction = (
+        samples[0],
+        [(k, what) for k, what in SAME_REDUCTION.items() if has_same_modes or k not in OF_MODES],
+    )
     for sample, name in zip(samples, names, strict=True):
         if (np.diag(sample.M) <= 0).any():
             raise BodyError(
@@ -328,7 +351,9 @@ def require_same_reduction(samples: Sequence[ReducedBody], names: Sequence[str])
             raise BodyError(
                 f"parametric body: {name}: quadratic modes cannot be interpolated; leave quadratic_modes out of the job"
             )
-        facts: list[tuple[str, Any, Any, str]] = [("number of modes", first.n_q, sample.n_q, SAME_MODES)]
+        facts: list[tuple[str, Any, Any, str]] = []
+        if has_same_modes:
+            facts.append(("number of modes", first.n_q, sample.n_q, SAME_MODES))
         facts += [(what, first.provenance.get(k), sample.provenance.get(k), SAME_MODES) for k, what in of_reduction]
         names_of = [", ".join(each.name for each in body.interfaces) or "none" for body in (first, sample)]
         facts.append(("interfaces", names_of[0], names_of[1], "Name the interfaces alike in all samples"))

@@ -11,6 +11,7 @@ For every row R over the dofs of the model (docs/theory.md §11):
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,14 +23,21 @@ from cms.reduction.basis.frames import FrameCondition
 from cms.reduction.recovery.blocks import Block, RowName
 from cms.reduction.recovery.interface_rows import PartOfTable, interface_part
 from cms.reduction.recovery.kept_rows import kept_part
-from cms.reduction.recovery.load_columns import SPIN, LoadColumns, loads_of_body, loads_of_model
+from cms.reduction.recovery.load_columns import (
+    SPIN,
+    LoadColumns,
+    forces_of_loads,
+    loads_of_body,
+    loads_of_model,
+    on_coordinates,
+)
 from cms.reduction.recovery.model_rows import model_block
-from cms.reduction.recovery.request import OF_INTERFACES, RecoveryRequest
+from cms.reduction.recovery.request import OF_INTERFACES, OF_MOTION, RecoveryRequest
 from fe_models.body.fe_body import FEBody
 from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.foundation.arrays import Array
 
-__all__ = ["recovery_matrices", "recovery_of_model"]
+__all__ = ["recovery_matrices", "recovery_of_model", "tables_of_fewer_modes"]
 
 OF_MODEL = (
     "omitted modes respond to inertia and loads statically; no Coriolis forces and no geometric "
@@ -217,3 +225,28 @@ def spin_part(places: tuple[Array, Array], reduced: ReducedBody, loads: LoadColu
             c = A.T @ (point - reduced.frame.origin)
             static[row, first : first + 6] = (A.T @ direction) @ spin_accelerations(c)
     return static
+
+
+# Of a body with fewer modes -------------------------------------------------------------------------------------------
+
+
+def tables_of_fewer_modes(body: ReducedBody, Z: Array) -> Mapping[str, RecoveryTable]:
+    """Return the tables of a body over the shapes Phi Z, (n_q, n_new), of which dropped modes respond statically.
+
+    In steps (3) and (4), Phi K⁻¹ Phiᵀ becomes smaller by Phi X Phiᵀ with X = K⁻¹ - Z (Zᵀ K Z)⁻¹ Zᵀ.
+    """
+    X = np.diag(1 / np.diag(body.K)) - Z @ np.linalg.solve(Z.T @ body.K @ Z, Z.T)
+    to_old = np.zeros((N_RIGID + body.n_q, N_RIGID + Z.shape[1]))
+    to_old[:N_RIGID, :N_RIGID], to_old[N_RIGID:, N_RIGID:] = np.eye(N_RIGID), Z
+    M = on_coordinates(body)[0]
+    tables = {}
+    for name, table in body.recovery.items():
+        has_static = np.array(
+            [each not in (*OF_MOTION[1:], *OF_INTERFACES) and table.truncated != OF_BODY for each in table.quantities]
+        )
+        rows = has_static[:, None] * table.dynamic[0][:, N_RIGID:] @ X
+        dynamic = np.array(table.dynamic)
+        dynamic[2] -= rows @ M[N_RIGID:]
+        static = table.static + rows @ forces_of_loads(body, table.loads)[N_RIGID:]
+        tables[name] = replace(table, dynamic=dynamic @ to_old, static=static)
+    return tables

@@ -275,11 +275,6 @@ def test_factors_of_the_mesh_are_above_zero(job):
         read_job(job, {"length": 0})
 
 
-def test_modes_that_cross_the_cutoff_are_refused(job):
-    with pytest.raises(BodyError, match=r"modes have no counterpart in .* Take another n_modes"):
-        reduce_family(job, {"thickness": [0.008, 0.03]})
-
-
 def test_values_that_do_not_ascend_are_refused(job):
     with pytest.raises(JobError, match=r"length: expected two to 7 ascending values, got 1\.2, 1"):
         reduce_family(job, {"length": [1.2, 1.0]})
