@@ -21,7 +21,7 @@ from floatframe.model.bodies.marker_shape import MarkerShape, interface_shape, i
 from floatframe.model.bodies.markers import Marker, body_name
 from floatframe.model.checked_values import unit_vector
 from floatframe.model.joints.rows import TWIST, RowCoordinate
-from floatframe.model.rotations import rotation_log
+from floatframe.model.rotations import rotation_exp, rotation_log
 from floatframe.model.system import System
 from floatframe.results.full_turns import through_turns
 from floatframe.results.joint_coordinates import end_motion
@@ -298,7 +298,8 @@ class AngleSensor:
 class DisplacementSensor:
     """Elastic displacement (x, y, z, size) of an interface or node of a flexible body in body axes, from all modes.
 
-    It is relative to the body frame of the modal file: in mean axes, less than relative to a clamped end.
+    It is relative to the body frame of the modal file: in mean axes, less than relative to a clamped end. With
+    `relative_to`, a place of the same body, it is what an observer at that place sees, who moves and rotates with it.
 
     Parameters
     ----------
@@ -306,27 +307,41 @@ class DisplacementSensor:
         Name of the sensor, unique in the system.
     marker
         An interface, or a kept node by number or position.
+    relative_to
+        Place of the same body relative to which it is observed, such as a clamped end; None: the body frame.
     """
 
     name: str
     marker: Marker
+    relative_to: Marker | None = None
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return x, y, z and size over time."""
-        body, shape = self.shape_of(system)
-        moved = shape.deformation(trajectory.body(body.name).q)[:, :3]
+        body, shape = self.shape_of(system, "marker", self.marker)
+        q = trajectory.body(body.name).q
+        moved = shape.deformation(q)[:, :3]
+        if self.relative_to is not None:
+            require_turning(system, f"sensor {self.name!r}: relative_to", self.relative_to)
+            other, seen_from = self.shape_of(system, "relative_to", self.relative_to)
+            if other.name != body.name:
+                raise ModelError(
+                    f"sensor {self.name!r}: relative_to: expected a place of body {body.name!r}, got one of "
+                    f"{other.name!r}; a position sensor with relative_to observes another body"
+                )
+            base, arm = seen_from.deformation(q), shape.position - seen_from.position
+            moved = np.einsum("tba,tb->ta", rotation_exp(base[:, 3:]), arm + moved - base[:, :3]) - arm
         columns, units = vector_columns(moved, system.units.length_symbol)
         return Measurement(self.name, trajectory.t, columns, units)
 
-    def shape_of(self, system: System) -> tuple[FlexibleBody, MarkerShape]:
-        """Return the body and the marker of the sensor, in the frame of the body's file."""
-        name, where = body_name(self.marker.body), f"sensor {self.name!r}: marker"
-        if is_at_node(system, self.marker):
-            body, found = found_nodes(system, where, self.marker)
+    def shape_of(self, system: System, key: str, marker: Marker) -> tuple[FlexibleBody, MarkerShape]:
+        """Return the body and the shape of a marker of the sensor, in the frame of the body's file."""
+        name, where = body_name(marker.body), f"sensor {self.name!r}: {key}"
+        if is_at_node(system, marker):
+            body, found = found_nodes(system, where, marker)
             return body, node_shape(body.reduced, found.rows, is_stiffened=False)
-        find_marker(system, where, self.marker)  # raises for an unknown body or interface
+        find_marker(system, where, marker)  # raises for an unknown body or interface
         of_system = next((each for each in system.bodies if each.name == name), None)
         if not isinstance(of_system, FlexibleBody):
             raise ModelError(f"sensor {self.name!r}: body {name!r} is not flexible; it has no elastic displacement")
-        assert self.marker.interface is not None  # ensured by `find_marker`
-        return of_system, interface_shape(of_system.reduced, self.marker.interface, is_stiffened=of_system.is_stiffened)
+        assert marker.interface is not None  # ensured by `find_marker`
+        return of_system, interface_shape(of_system.reduced, marker.interface, is_stiffened=of_system.is_stiffened)

@@ -127,6 +127,19 @@ def test_displacement_of_interface_and_of_the_node_nearest_to_a_position(swing):
     )
 
 
+def test_a_displacement_relative_to_an_end_is_the_change_of_its_position_seen_from_there(swing):
+    system, end = swing_system(), REDUCED.interface("end_b")
+    base = Marker("rod", "end_b")
+    seen = vector(system, swing, PlaceSensor("p", TIP, relative_to=base)) @ end.triad.T  # from axes of the end
+    arm = REDUCED.interface("end_a").position - end.position
+    found = vector(system, swing, DisplacementSensor("d", TIP, base))
+    assert_allclose(found, seen - arm, rtol=0, atol=1e-13 * np.linalg.norm(arm))
+    assert np.abs(found).max() > 1e-6 * np.linalg.norm(arm)
+    assert_allclose(vector(system, swing, DisplacementSensor("d", base, base)), 0.0, atol=1e-15)
+    with pytest.raises(ModelError, match="body 'arm' is not flexible"):
+        DisplacementSensor("d", TIP, Marker("arm")).measure(system, swing)
+
+
 def test_stress_strain_and_their_largest(swing):
     system = swing_system()
     q, node = swing.body("rod").q, 11
