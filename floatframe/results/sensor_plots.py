@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -69,8 +69,10 @@ def plot_measurement(
     unit = measurement.units[columns[0]]
     for k, name in enumerate(columns):
         is_sum = name.split()[-1] in ("size", "total", "von")
-        line = {"linewidth": 1.0, "color": "k"} if is_sum else {"linewidth": 1.5}
+        line: dict[str, Any] = {"linewidth": 1.0, "color": "k"} if is_sum else {"linewidth": 1.5}
         style = "-" if k < N_COLORS else "--"
+        if is_sum and len(columns) > 1:  # where one component is all, gaps show its curve below
+            line["dashes"] = (4, 5)
         ax.plot(measurement.t, measurement.columns[name], style, label=name, **line)
     ax.set_xlabel(f"time [{time_symbol}]")
     ax.set_title("\n".join([measurement.sensor, *measurement.places]), fontsize="medium")

@@ -67,6 +67,12 @@ def test_a_motion_plots_sensors_joints_and_bodies_with_units(motion):
     assert panels == [*own, ("pin reaction", "pin reaction [N]"), ("pin reaction", "pin reaction [N m]")]
 
 
+def test_gaps_of_the_size_show_the_component_below_it(motion):
+    (ax,) = motion.plot("bob at").axes
+    dashed = {line.get_label(): line.is_dashed() for line in ax.lines}
+    assert dashed == {"x": False, "z": False, "size": True}
+
+
 def test_axes_have_the_units_of_the_system():
     motion = integrate(replace(SWING, units=unit_system("mm-kg-ms")), GeneralizedAlpha(), 0.05, 1e-3)
     assert labels(motion.plot("bob at"))[0][:2] == ("time [ms]", "bob at [mm]")

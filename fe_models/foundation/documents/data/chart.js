@@ -163,7 +163,8 @@
           for (const v of labels[k]) put(svg, "path", { d: `M${left} ${panel.y.at(v)}H${right}`, stroke: "var(--grid)" });
           if (!bars.length) for (const v of xTicks) put(svg, "path", { d: `M${this.x.at(v)} ${panel.top}V${panel.bottom}`, stroke: "var(--grid)" });
         }
-        for (const v of labels[k]) put(svg, "text", { x: left - 6, y: panel.y.at(v) + 4, "text-anchor": "end", fill: "var(--text)" }, short(v));
+        const words = panel.y.isLog && labels[k].some((v) => short(v).includes("10")) && labels[k].some((v) => v < 1e-3) ? power : short;
+        for (const v of labels[k]) put(svg, "text", { x: left - 6, y: panel.y.at(v) + 4, "text-anchor": "end", fill: "var(--text)" }, words(v));
         put(svg, "path", { d: `M${left} ${panel.top}V${panel.bottom}H${right}`, stroke: "var(--axis)", fill: "none" });
         const title = put(svg, "text", { "text-anchor": "middle", fill: "var(--text)", transform: `translate(${Math.max(11, left - 14 - 6.6 * widest)} ${(panel.top + panel.bottom) / 2}) rotate(-90)`, "font-size": n > 1 ? 10 : 12 });
         panel.axis.label.split("\n").forEach((words, j, parts) => put(title, "tspan", { x: 0, dy: j ? 11 : -11 * (parts.length - 1) / 2 }, words));
@@ -182,7 +183,10 @@
         const made = put(svg, "rect", { x: this.x.at(j - 0.4 + wide * k), width: Math.max(1, this.x.at(wide) - this.x.at(0) - 1), y: y.at(value), height: Math.max(0, foot - y.at(value)), fill: tone(bar.color) });
         put(made, "title", {}, `${bar.name}\n${chart.names[j]}: ${short(value)}`);
       }));
-      for (const v of xTicks) put(svg, "text", { x: this.x.at(v), y: foot + 16, "text-anchor": "middle", fill: "var(--text)" }, bars.length ? chart.names[v] : short(v));
+      for (const v of xTicks) {
+        const words = bars.length ? chart.names[v] : short(v);
+        put(svg, "text", { x: Math.min(this.x.at(v), width - 3.4 * words.length), y: foot + 16, "text-anchor": "middle", fill: "var(--text)" }, words);
+      }
       put(svg, "text", { x: (left + right) / 2, y: foot + 36, "text-anchor": "middle", fill: "var(--text)", "font-size": 12 }, this.isOther && chart.other_label ? chart.other_label : chart.x.label);
       this.dot = put(svg, "circle", { r: 4.5, fill: "none", stroke: "var(--ink)", "stroke-width": 1.5, visibility: "hidden" });
       this.frame = put(svg, "rect", { y: this.panels[0].top, height: foot - this.panels[0].top, fill: "var(--accent)", "fill-opacity": 0.12, visibility: "hidden" });
