@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Iterator
+from functools import cache
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -87,6 +88,8 @@ def parameters_table(parameters: list[Any]) -> list[str]:
 
 # keys ------------------------------------------------------------------------------------------------------------
 
+EXAMPLES = Path(__file__).with_name("examples.toml")
+
 
 def keys_page(kind: str) -> str:
     """Return the page of the keys of a kind of file: the file, then its tables, those of one place together."""
@@ -104,7 +107,25 @@ def keys_page(kind: str) -> str:
         for _, name, meaning, rows in sections:
             lines += [f"### {name}", ""] if name else []
             lines += [literal(meaning[:1].upper() + meaning[1:]), "", *rows, ""]
+            if example := examples().get((table_of(place), name)):
+                lines += ["```toml", example, "```", ""]
     return "\n".join(lines)
+
+
+@cache
+def examples() -> dict[tuple[str, str], str]:
+    """Return the text of the example of each type of table, by the table and the type."""
+    texts = [text.strip() for text in EXAMPLES.read_text(encoding="utf-8").split("\n\n")]
+    return {
+        (table_of(text), re.search(r'^type = "(.+)"', text, re.MULTILINE)[1]): text for text in texts if text[0] == "["
+    }
+
+
+def table_of(place: str) -> str:
+    """Return which table a heading names: "joints" for [joints.NAME], "motions" for a function, "scene" for a shape."""
+    heads = re.findall(r"\[([\w.]+)\]", place.partition("\n")[0])
+    head = heads[-1].split(".") if heads else [place]
+    return "motions" if "motions" in head else head[0]
 
 
 def sections_of(schema: dict[str, Any]) -> list[tuple[str, str, str, list[str]]]:

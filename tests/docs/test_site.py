@@ -6,10 +6,12 @@ import json
 import logging
 import re
 import sys
+import tomllib
 import warnings
 from types import SimpleNamespace
 
 import pytest
+from pydantic import TypeAdapter
 
 from cms.assessment.quality.limits import LIMITS
 from cms.body.modal_file.schema import ENTRIES, GROUPS
@@ -19,6 +21,8 @@ from fe_models.files.ansys.command_fields import COMMANDS
 from fe_models.files.nastran.deck.card_fields import CARDS
 from fe_models.foundation.file_kinds import KINDS
 from fe_models.foundation.parametric_file import schema_text
+from floatframe.files.system_file.described import MotionSection
+from floatframe.files.system_file.read_system import SystemFile
 from floatframe.results.results_file import DATASETS
 from tests.root import ROOT
 
@@ -55,6 +59,23 @@ def test_every_public_name_has_an_entry_on_one_page_of_names(tmp_path):
             expected = set(public_names.public_names(module)) - set(handed_on)
             assert {name for owner, name in entries if owner == module} == expected
             assert all((other, name) in entries for name, other in handed_on.items())
+
+
+def test_every_type_of_every_table_has_an_example_that_is_read(tmp_path):
+    (tmp_path / "housing.stl").touch()
+    sections = reference_pages.sections_of(json.loads(schema_text("system")))
+    types = {(reference_pages.table_of(place), name) for place, name, _, _ in sections if name and place[0] == "["}
+    examples = reference_pages.examples()
+    assert types == set(examples)
+    page = reference_pages.keys_page("system")
+    for (table, kind), text in examples.items():
+        assert text in page
+        value = tomllib.loads(text)["joints" if table == "motions" else table]
+        if table == "motions":
+            ((value,),) = (joint["motions"].values() for joint in value.values())
+        hint = MotionSection if table == "motions" else SystemFile.model_fields[table].annotation
+        read = TypeAdapter(hint).validate_python(value, context=tmp_path)
+        assert kind in str(read), (table, kind)
 
 
 def test_a_page_of_names_that_is_gone_is_removed(tmp_path):
