@@ -18,13 +18,13 @@ from floatframe.engine.kernels.connections.pair_force import pair_derivatives, p
 from floatframe.engine.kernels.connections.user_force import user_force_derivatives, user_force_rows
 from floatframe.engine.kernels.joints.relative_motion import (
     by_markers,
-    direction,
-    distance,
     put_pair,
-    relative_velocity,
+    rate_along,
 )
 from floatframe.engine.kernels.joints.row_formulas import (
     held_by_place,
+    held_gap,
+    held_rate,
     held_rates,
     held_value,
     wrench_derivatives,
@@ -32,8 +32,8 @@ from floatframe.engine.kernels.joints.row_formulas import (
 )
 from floatframe.engine.kernels.marker import marker_acceleration_bias
 from floatframe.engine.kernels.model import COUPLER, ELEMENT, JOINT, USER_FORCE
-from floatframe.engine.kernels.vector import cross, dot, put, put_sum, scaled, sub, vector
-from floatframe.model.joints.rows.kinds import DOT, NOTHING, POINT, POSITION, VELOCITY
+from floatframe.engine.kernels.vector import dot, put, put_sum, scaled, sub, vector
+from floatframe.model.joints.rows.kinds import NOTHING, POSITION, VELOCITY
 
 __all__ = [
     "connection_derivatives",
@@ -68,29 +68,22 @@ def connection_rows(model, work, c, c_k):
     if law != JOINT:
         pair_rows(model, work, c, c_k)
     else:
-        d = distance(work.markers, a, b)
         for k in range(w0, w0 + size):
-            joint_row(model, work, k, a, b, d, w, c_k)
+            joint_row(model, work, k, a, b, w, c_k)
 
 
 @small
-def joint_row(model, work, k, a, b, d, w, c_k):
-    """Write the residual of row k of a joint; d: vector from A to B. The most frequent formulas are repeated here."""
+def joint_row(model, work, k, a, b, w, c_k):
+    """Write the residual of row k of a joint."""
     kind, soft = model.rows.kind[k], model.rows.soft[k]
     if model.rows.holds[k] == NOTHING:
         work.connections.g[k] = c_k * wrench_value(kind, model, work, k, a, b, w)
         return
-    if soft == 0.0 and kind == POINT:
-        work.connections.g[k] = -dot(vector(model.rows.x[k]), d)
-        return
-    if soft == 0.0 and kind == DOT:
-        E, D = direction(work.markers, a, model.rows.x[k]), direction(work.markers, b, model.rows.y[k])
-        work.connections.g[k] = dot(E, D) - model.rows.c[k]
+    if soft == 0.0:
+        work.connections.g[k] = held_gap(kind, model, work, k, a, b)
         return
     g, n, _, m_b = held_value(kind, model, work, k, a, b)
-    if soft > 0.0:
-        g -= soft * c_k * (dot(n, vector(w)) + dot(m_b, vector(w[model.rows.part[k] :])))
-    work.connections.g[k] = g
+    work.connections.g[k] = g - soft * c_k * (dot(n, vector(w)) + dot(m_b, vector(w[model.rows.part[k] :])))
 
 
 @inner
@@ -163,35 +156,11 @@ def write_velocity_gaps(model, work, c, factor, gap):
             if model.rows.holds[k] == POSITION:
                 gap[k] = g[k] - factor * coupler_rate(model, work, c)
         return
-    a, b, markers = model.connections.a[c], model.connections.b[c], work.markers
-    v = relative_velocity(markers, a, b)
-    omega = sub(vector(markers.omega[b]), vector(markers.omega[a]))
+    a, b = model.connections.a[c], model.connections.b[c]
     for k in range(w0, end):
-        kind = model.rows.kind[k]
-        if kind == POINT:
-            gap[k] = g[k] + factor * dot(vector(model.rows.x[k]), v)
-        elif kind == DOT:  # E · D, which a rotation about E × D changes
-            E, D = direction(markers, a, model.rows.x[k]), direction(markers, b, model.rows.y[k])
-            gap[k] = g[k] + factor * dot(cross(E, D), omega)
-        elif model.rows.holds[k] == POSITION:
-            gap[k] = g[k] - factor * held_rate(model, work, k, a, b, v)
-        else:
-            gap[k] = 0.0
-
-
-@inner
-def held_rate(model, work, k, a, b, v):
-    """Return the rate of the constrained position of row k; v: relative velocity of its markers."""
-    kind, markers = model.rows.kind[k], work.markers
-    _, n, m_a, m_b = held_value(kind, model, work, k, a, b)
-    rate, _ = held_rates(kind, model, work, k, a, b)
-    return rate + along(n, m_a, m_b, v, vector(markers.omega[a]), vector(markers.omega[b]))
-
-
-@small
-def along(n, m_a, m_b, v, omega_a, omega_b):
-    """Return n · v + m_a · omega_A + m_b · omega_B."""
-    return dot(n, v) + dot(m_a, omega_a) + dot(m_b, omega_b)
+        gap[k] = 0.0
+        if model.rows.holds[k] == POSITION:
+            gap[k] = g[k] - factor * held_rate(model.rows.kind[k], model, work, k, a, b)
 
 
 @inner
@@ -207,11 +176,10 @@ def row_rates(model, work, k, a, b):
     kind, markers = rows.kind[k], work.markers
     _, n, m_a, m_b = held_value(kind, model, work, k, a, b)
     rate, second = held_rates(kind, model, work, k, a, b)
-    v = relative_velocity(markers, a, b)
-    rate += along(n, m_a, m_b, v, vector(markers.omega[a]), vector(markers.omega[b]))
+    rate += rate_along(markers, a, b, n, m_a, m_b)
     bias_a, bias_b = markers.bias[a], markers.bias[b]
-    second += along(n, m_a, m_b, sub(bias_b, bias_a), vector(bias_a[3:]), vector(bias_b[3:]))
-    return rate, second
+    turning = dot(m_a, vector(bias_a[3:])) + dot(m_b, vector(bias_b[3:]))
+    return rate, second + dot(n, sub(bias_b, bias_a)) + turning
 
 
 @inner

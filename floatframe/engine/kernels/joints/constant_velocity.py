@@ -10,32 +10,43 @@ both shafts are in line. The rotation from A to B is about an axis normal to bot
 Described in `floatframe.model.joints.orientation_joints`.
 """
 
-from floatframe.engine.kernels.compiler.compilation import inner
-from floatframe.engine.kernels.joints.held_rows import axis_rates, product, product_rates
+from floatframe.engine.kernels.compiler.compilation import inner, small
+from floatframe.engine.kernels.joints.held_rows import gap_of, gradient_of, of_a, of_b, product_rates, times
 from floatframe.engine.kernels.joints.relative_motion import direction
 from floatframe.engine.kernels.vector import add, cross, dot, put, scaled, sub, vector
 
-__all__ = ["bisector_derivatives", "bisector_value", "equal_turn_rates", "equal_turn_value"]
+__all__ = [
+    "bisector_derivatives",
+    "bisector_value",
+    "equal_turn_products",
+    "equal_turn_rates",
+    "equal_turn_value",
+]
+
+
+@small
+def equal_turn_products(rows, k):
+    """Return the two products of which EQUAL_TURN is the difference."""
+    return times(of_a(rows.x[k]), of_b(rows.u[k])), times(of_a(rows.z[k]), of_b(rows.y[k]))
 
 
 @inner
 def equal_turn_value(model, work, k, a, b):
     """Return the value of EQUAL_TURN: E · U - Z · D."""
-    rows, markers = model.rows, work.markers
-    g_1, zero, m_1, _ = product(direction(markers, a, rows.x[k]), direction(markers, b, rows.u[k]))
-    g_2, _, m_2, _ = product(direction(markers, a, rows.z[k]), direction(markers, b, rows.y[k]))
+    markers = work.markers
+    first, second = equal_turn_products(model.rows, k)
+    zero, m_1, _ = gradient_of(first, markers, a, b)
+    _, m_2, _ = gradient_of(second, markers, a, b)
     m = sub(m_1, m_2)
-    return g_1 - g_2, zero, m, scaled(-1.0, m)
+    return gap_of(first, markers, a, b) - gap_of(second, markers, a, b), zero, m, scaled(-1.0, m)
 
 
 @inner
 def equal_turn_rates(model, work, k, a, b):
     """Return the rates of EQUAL_TURN."""
-    rows, markers = model.rows, work.markers
-    E, Z = axis_rates(markers, a, vector(rows.x[k])), axis_rates(markers, a, vector(rows.z[k]))
-    D, U = axis_rates(markers, b, vector(rows.y[k])), axis_rates(markers, b, vector(rows.u[k]))
-    _, beta_1 = product_rates(E, U)
-    _, beta_2 = product_rates(Z, D)
+    first, second = equal_turn_products(model.rows, k)
+    _, beta_1 = product_rates(first, work.markers, a, b)
+    _, beta_2 = product_rates(second, work.markers, a, b)
     return 0.0, beta_1 - beta_2
 
 

@@ -22,7 +22,7 @@ Described in `floatframe.model.joints.sliding`.
 """
 
 from floatframe.engine.kernels.compiler.compilation import inner
-from floatframe.engine.kernels.joints.held_rows import ZERO, axis_rates, product_rates
+from floatframe.engine.kernels.joints.held_rows import ZERO, dot_rates, of_b, rates_of
 from floatframe.engine.kernels.joints.relative_motion import direction, distance, prescribed, relative_velocity
 from floatframe.engine.kernels.marker import bent_bias, pose_on_body, shape, shapes_of
 from floatframe.engine.kernels.rotation import left_jacobian, left_jacobian_derivative
@@ -314,7 +314,7 @@ def line_turn_rates(model, work, k, a, b):
     o = add(vector(work.markers.omega[a]), scaled(s_dot, kappa))
     E_dot = cross(o, E)
     turning = second * dot(m, kappa) + dot(m, vector(line.turning[j]))
-    _, beta = product_rates((E, ZERO, E_dot, cross(o, E_dot)), axis_rates(work.markers, b, vector(rows.y[k])))
+    _, _, beta = dot_rates((E, E_dot, cross(o, E_dot)), rates_of(of_b(rows.y[k]), work.markers, a, b))
     return rate * dot(m, kappa), turning + beta
 
 

@@ -14,195 +14,239 @@ The force n on B, -n on A, with the moments m_b, m_a, is its unit reaction. A ki
 A row that constrains a velocity (ROLL) has the same form: g is the velocity, n, m_a, m_b are its derivatives by the
 velocities of the markers, and beta is its rate at zero accelerations.
 
-Most rows are products of two vectors, each fixed in A, fixed in B, or d. A direction E of A may also rotate relative to
-A, with the rates E_t and E_tt. With omega_A = o, the product rule needs
+Most rows are products, g = c(t) P · Q - o(t): P and Q are d or directions fixed in A, in B or in the ground. A kind of
+this form is one function of (model, k, t), which returns the product. The functions of the row follow from it, and its
+change and reaction over a step of the structure-preserving schemes.
+
+A direction E of A may also rotate relative to A, with the rates E_t and E_tt. With omega_A = o, the product rule needs
 
     E_dot = o × E + E_t,   E_ddot - alpha × E = o × (o × E) + 2 o × E_t + E_tt
 """
 
 import math
+from typing import NamedTuple
 
 from floatframe.engine.kernels.compiler.compilation import inner, small
 from floatframe.engine.kernels.joints.relative_motion import (
     angle_between,
     axis_between,
-    direction,
     distance,
-    prescribed,
     prescribed_at,
     relative_velocity,
 )
 from floatframe.engine.kernels.vector import add, cross, dot, scaled, sub, turned, vector
-from floatframe.model.joints.rows.kinds import DOT, EQUAL_TURN, TURN_B
 
 __all__ = [
+    "A_TO_B",
+    "OF_A",
+    "OF_BOTH",
+    "OF_GROUND",
     "ZERO",
-    "angle_rates",
-    "axis_rates",
-    "directions",
-    "distance_rates",
-    "distance_value",
-    "dot_value",
-    "point_rates",
-    "point_value",
-    "product",
+    "Product",
+    "Side",
+    "dot_product",
+    "dot_rates",
+    "gap_of",
+    "gradient_of",
+    "length",
+    "motion_rate",
+    "of_a",
+    "of_b",
+    "point",
     "product_rates",
+    "rate_in_time",
     "rates_of",
     "screw_rates",
     "screw_value",
-    "slide_rates",
-    "slide_value",
-    "span_rates",
-    "turn_value",
+    "slide",
+    "times",
+    "turn",
+    "turn_about_b",
 ]
 
 ZERO = (0.0, 0.0, 0.0)
+ONE, MINUS_ONE = (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)
 
 
 # products of two vectors ----------------------------------------------------------------------------------------------
 
-
-@small
-def product(E, D):
-    """Return E · D with its derivatives, E fixed in A and D in B."""
-    m = cross(E, D)
-    return dot(E, D), ZERO, m, scaled(-1.0, m)
+OF_GROUND, OF_A, OF_B, OF_BOTH = range(4)  #: what a vector is fixed in; OF_BOTH: it is d
 
 
-@small
-def fixed(x):
-    """Return a direction of a marker with its rates relative to it, which are zero."""
-    return vector(x), ZERO, ZERO
+class Side(NamedTuple):
+    """A vector of a product."""
+
+    of: int  #: OF_GROUND, OF_A, OF_B or OF_BOTH
+    e: tuple[float, float, float]  #: the direction relative to what it is fixed in; not used for d
+    e_t: tuple[float, float, float]  #: its first and second rate relative to what it is fixed in
+    e_tt: tuple[float, float, float]
 
 
-@inner
-def rates_of(markers, m, e):
-    """Return E, E_t, E_dot and E_ddot - alpha × E in ground axes; e: a direction of marker m and its relative rates."""
-    A, omega = markers.A[m], vector(markers.omega[m])
-    E, E_t, E_tt = turned(A, e[0]), turned(A, e[1]), turned(A, e[2])
-    along = cross(omega, E)
-    return E, E_t, add(along, E_t), add(cross(omega, add(along, scaled(2.0, E_t))), E_tt)
+class Product(NamedTuple):
+    """The quantity c P · Q - o; c and o with their first and second rate."""
+
+    P: Side
+    Q: Side
+    c: tuple[float, float, float]
+    o: tuple[float, float, float]
 
 
-@inner
-def axis_rates(markers, m, x):
-    """Return the rates of direction x of marker m as `rates_of`."""
-    E, omega = turned(markers.A[m], x), vector(markers.omega[m])
-    E_dot = cross(omega, E)
-    return E, ZERO, E_dot, cross(omega, E_dot)
-
-
-@inner
-def span_rates(markers, a, b):
-    """Return d and its rates as `rates_of`."""
-    return distance(markers, a, b), ZERO, relative_velocity(markers, a, b), ZERO
-
-
-@inner
-def product_rates(P, Q):
-    """Return dg/dt and beta of P · Q from the vectors and their rates."""
-    beta = dot(P[3], Q[0]) + 2 * dot(P[2], Q[2]) + dot(P[0], Q[3])
-    return dot(P[1], Q[0]) + dot(P[0], Q[1]), beta
-
-
-# rows -----------------------------------------------------------------------------------------------------------------
+A_TO_B = Side(OF_BOTH, ZERO, ZERO, ZERO)  #: d
 
 
 @small
-def point_value(model, work, k, a, b):
-    """Return the value of POINT: -x · d, with x in ground axes."""
-    x = vector(model.rows.x[k])
-    return -dot(x, distance(work.markers, a, b)), scaled(-1.0, x), ZERO, ZERO
-
-
-@inner
-def point_rates(model, work, k, a, b):
-    """Return the rates of POINT, to which only the motion of the points contributes."""
-    return 0.0, 0.0
+def of_a(x):
+    """Return a direction fixed in A."""
+    return Side(OF_A, vector(x), ZERO, ZERO)
 
 
 @small
-def directions(model, k, t):
-    """Return the directions in A and in B whose product row k constrains, with their relative rates.
+def of_b(x):
+    """Return a direction fixed in B."""
+    return Side(OF_B, vector(x), ZERO, ZERO)
 
-    DOT: x and y. EQUAL_TURN, first product: x and u. TURN: x cos f + z sin f and y. TURN_B measures f from B: y and
-    x cos f - z sin f.
-    """
-    kind, y = model.rows.kind[k], fixed(model.rows.y[k])
-    if kind == DOT:
-        return fixed(model.rows.x[k]), y
-    if kind == EQUAL_TURN:
-        return fixed(model.rows.x[k]), fixed(model.rows.u[k])
-    e = turning(model, k, t, -1.0 if kind == TURN_B else 1.0)
-    return (y, e) if kind == TURN_B else (e, y)
+
+@small
+def times(P, Q):
+    """Return the product P · Q."""
+    return Product(P, Q, ONE, ZERO)
+
+
+@small
+def point(model, k, t):
+    """POINT: -x · d, x in ground axes."""
+    return Product(Side(OF_GROUND, vector(model.rows.x[k]), ZERO, ZERO), A_TO_B, MINUS_ONE, ZERO)
+
+
+@small
+def dot_product(model, k, t):
+    """DOT: E · D - c."""
+    return Product(of_a(model.rows.x[k]), of_b(model.rows.y[k]), ONE, (model.rows.c[k], 0.0, 0.0))
+
+
+@small
+def turn(model, k, t):
+    """TURN: (E cos f + Z sin f) · D."""
+    return times(turning(model, OF_A, k, t, 1.0), of_b(model.rows.y[k]))
+
+
+@small
+def turn_about_b(model, k, t):
+    """TURN_B: TURN with A and B exchanged, and -f."""
+    return times(of_a(model.rows.y[k]), turning(model, OF_B, k, t, -1.0))
+
+
+@small
+def slide(model, k, t):
+    """SLIDE: E · d - f."""
+    return Product(of_a(model.rows.x[k]), A_TO_B, ONE, prescribed_at(model, k, t))
+
+
+@small
+def length(model, k, t):
+    """DISTANCE: (d · d/f - f)/2."""
+    f, rate, second = prescribed_at(model, k, t)
+    c = 0.5 / f
+    c_t, c_tt = -c * rate / f, c * (2.0 * rate * rate / f - second) / f
+    return Product(A_TO_B, A_TO_B, (c, c_t, c_tt), (0.5 * f, 0.5 * rate, 0.5 * second))
 
 
 @inner
-def turning(model, k, t, sense):
-    """Return x cos f + z sin f with its rates, f: the prescribed angle times the sense."""
+def turning(model, of, k, t, sense):
+    """Return x cos f + z sin f, f: the prescribed angle times the sense."""
     f, rate, second = prescribed_at(model, k, t)
     c, s, x, z = math.cos(f), sense * math.sin(f), vector(model.rows.x[k]), vector(model.rows.z[k])
     e, n = add(scaled(c, x), scaled(s, z)), sub(scaled(c, z), scaled(s, x))
-    return e, scaled(sense * rate, n), sub(scaled(sense * second, n), scaled(rate * rate, e))
+    return Side(of, e, scaled(sense * rate, n), sub(scaled(sense * second, n), scaled(rate * rate, e)))
 
 
 @small
-def dot_value(model, work, k, a, b):
-    """Return the value of DOT: E · D - c."""
-    rows, markers = model.rows, work.markers
-    g, n, m_a, m_b = product(direction(markers, a, rows.x[k]), direction(markers, b, rows.y[k]))
-    return g - rows.c[k], n, m_a, m_b
-
-
-@inner
-def turn_value(model, work, k, a, b):
-    """Return the value of TURN or TURN_B: E · D."""
-    e, y = directions(model, k, work.state.time)
-    return product(turned(work.markers.A[a], e[0]), turned(work.markers.A[b], y[0]))
-
-
-@inner
-def angle_rates(model, work, k, a, b):
-    """Return the rates of DOT, TURN or TURN_B."""
-    e, y = directions(model, k, work.state.time)
-    return product_rates(rates_of(work.markers, a, e), rates_of(work.markers, b, y))
+def in_ground(of, x, markers, a, b):
+    """Return a direction in ground axes."""
+    return x if of == OF_GROUND or of == OF_BOTH else turned(markers.A[a if of == OF_A else b], x)
 
 
 @small
-def slide_value(model, work, k, a, b):
-    """Return the value of SLIDE: E · d - f."""
-    markers = work.markers
-    f, _, _ = prescribed(model, work, k)
-    E, d = direction(markers, a, model.rows.x[k]), distance(markers, a, b)
-    return dot(E, d) - f, E, cross(E, d), ZERO
+def vector_of(side, markers, a, b):
+    """Return a vector of a product in ground axes."""
+    return distance(markers, a, b) if side.of == OF_BOTH else in_ground(side.of, side.e, markers, a, b)
+
+
+@small
+def gap_of(one, markers, a, b):
+    """Return the value of a product."""
+    return one.c[0] * dot(vector_of(one.P, markers, a, b), vector_of(one.Q, markers, a, b)) - one.o[0]
+
+
+@small
+def gradient_of(one, markers, a, b):
+    """Return n, m_a and m_b of a product; if P is fixed in A, its change is (dphi_A × P) · Q = dphi_A · (P × Q)."""
+    c, P, Q = one.c[0], vector_of(one.P, markers, a, b), vector_of(one.Q, markers, a, b)
+    m = scaled(c, cross(P, Q))
+    opposite = scaled(-1.0, m)
+    n = share(one, OF_BOTH, scaled(c, Q), scaled(c, P))
+    return n, share(one, OF_A, m, opposite), share(one, OF_B, m, opposite)
+
+
+@small
+def share(one, of, by_p, by_q):
+    """Return the sum of by_p, if P is of the kind `of`, and by_q, if Q is."""
+    first = by_p if one.P.of == of else ZERO
+    return add(first, by_q) if one.Q.of == of else first
 
 
 @inner
-def slide_rates(model, work, k, a, b):
-    """Return the rates of SLIDE."""
-    markers = work.markers
-    _, rate, second = prescribed(model, work, k)
-    _, beta = product_rates(axis_rates(markers, a, vector(model.rows.x[k])), span_rates(markers, a, b))
-    return -rate, beta - second
+def rate_in_time(one, markers, a, b):
+    """Return dg/dt of a product, which its rotating direction, c and o cause."""
+    P, Q = vector_of(one.P, markers, a, b), vector_of(one.Q, markers, a, b)
+    P_t, Q_t = in_ground(one.P.of, one.P.e_t, markers, a, b), in_ground(one.Q.of, one.Q.e_t, markers, a, b)
+    return one.c[0] * (dot(P_t, Q) + dot(P, Q_t)) + one.c[1] * dot(P, Q) - one.o[1]
+
+
+@small
+def motion_rate(one, markers, a, b):
+    """Return g_dot - dg/dt of a product."""
+    P, Q = vector_of(one.P, markers, a, b), vector_of(one.Q, markers, a, b)
+    return one.c[0] * (dot(moved(one.P, P, markers, a, b), Q) + dot(P, moved(one.Q, Q, markers, a, b)))
+
+
+@small
+def moved(side, P, markers, a, b):
+    """Return P_dot - P_t of a vector P of a product."""
+    if side.of == OF_GROUND:
+        return ZERO
+    if side.of == OF_BOTH:
+        return relative_velocity(markers, a, b)
+    return cross(vector(markers.omega[a if side.of == OF_A else b]), P)
 
 
 @inner
-def distance_value(model, work, k, a, b):
-    """Return the value of DISTANCE: (d · d/f - f)/2."""
-    f, _, _ = prescribed(model, work, k)
-    d = distance(work.markers, a, b)
-    return 0.5 * (dot(d, d) / f - f), scaled(1.0 / f, d), ZERO, ZERO
+def rates_of(side, markers, a, b):
+    """Return P, P_dot and P_ddot - alpha × P of a vector of a product in ground axes."""
+    P, P_t = vector_of(side, markers, a, b), in_ground(side.of, side.e_t, markers, a, b)
+    P_dot = add(moved(side, P, markers, a, b), P_t)
+    if side.of == OF_GROUND or side.of == OF_BOTH:
+        return P, P_dot, ZERO
+    P_tt, omega = in_ground(side.of, side.e_tt, markers, a, b), vector(markers.omega[a if side.of == OF_A else b])
+    return P, P_dot, add(cross(omega, add(P_dot, P_t)), P_tt)
 
 
 @inner
-def distance_rates(model, work, k, a, b):
-    """Return the rates of DISTANCE."""
-    markers = work.markers
-    f, rate, second = prescribed(model, work, k)
-    d, v = distance(markers, a, b), relative_velocity(markers, a, b)
-    square = dot(d, d) / (f * f)
-    own = (dot(v, v) - 2 * dot(d, v) * rate / f + square * rate * rate) / f
-    return -0.5 * rate * (square + 1.0), own - 0.5 * second * (square + 1.0)
+def dot_rates(P, Q):
+    """Return P · Q and its first and second rate, the latter at zero accelerations, from `rates_of` both."""
+    second = dot(P[2], Q[0]) + 2 * dot(P[1], Q[1]) + dot(P[0], Q[2])
+    return dot(P[0], Q[0]), dot(P[1], Q[0]) + dot(P[0], Q[1]), second
+
+
+@inner
+def product_rates(one, markers, a, b):
+    """Return dg/dt and beta of a product."""
+    x, x_dot, x_ddot = dot_rates(rates_of(one.P, markers, a, b), rates_of(one.Q, markers, a, b))
+    beta = one.c[0] * x_ddot + 2 * one.c[1] * x_dot + one.c[2] * x - one.o[2]
+    return rate_in_time(one, markers, a, b), beta
+
+
+# rows that are not one product ---------------------------------------------------------------------------------------
 
 
 @inner
@@ -220,4 +264,4 @@ def screw_value(model, work, k, a, b):
 def screw_rates(model, work, k, a, b):
     """Return the rates of SCREW; the second rate of the angle is the one for parallel axes."""
     axis = cross(vector(model.rows.x[k]), vector(model.rows.z[k]))
-    return product_rates(axis_rates(work.markers, a, axis), span_rates(work.markers, a, b))
+    return product_rates(times(of_a(axis), A_TO_B), work.markers, a, b)

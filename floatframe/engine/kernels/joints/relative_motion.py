@@ -24,6 +24,7 @@ __all__ = [
     "prescribed",
     "prescribed_at",
     "put_pair",
+    "rate_along",
     "relative_velocity",
     "slip",
     "turned_angle",
@@ -66,6 +67,13 @@ def relative_velocity(markers, a, b):
 def slip(markers, a, b, d):
     """Return the velocity of the point of B relative to A: v_B - v_A - omega_A × d."""
     return sub(relative_velocity(markers, a, b), cross(vector(markers.omega[a]), d))
+
+
+@small
+def rate_along(markers, a, b, n, m_a, m_b):
+    """Return n · (v_B - v_A) + m_a · omega_A + m_b · omega_B."""
+    turning = dot(m_a, vector(markers.omega[a])) + dot(m_b, vector(markers.omega[b]))
+    return dot(n, relative_velocity(markers, a, b)) + turning
 
 
 @inner

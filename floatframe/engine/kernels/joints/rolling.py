@@ -13,7 +13,7 @@ Described in `floatframe.model.joints.rolling_disc`.
 """
 
 from floatframe.engine.kernels.compiler.compilation import inner
-from floatframe.engine.kernels.joints.held_rows import axis_rates, product_rates, span_rates
+from floatframe.engine.kernels.joints.held_rows import A_TO_B, dot_rates, of_a, of_b, rates_of
 from floatframe.engine.kernels.joints.relative_motion import direction, distance, put_pair, relative_velocity
 from floatframe.engine.kernels.vector import add, cross, dot, norm, put, put_sum, scaled, sub, vector
 from floatframe.model.joints.rows.kinds import FORCE, MOMENT_B
@@ -61,11 +61,10 @@ def height_value(model, work, k, a, b):
 def height_rates(model, work, k, a, b):
     """Return the rates of RIM_HEIGHT."""
     rows, markers = model.rows, work.markers
-    _, _, c, s, _ = rim(rows, markers, k, a, b)
-    N, n = axis_rates(markers, a, vector(rows.z[k])), axis_rates(markers, b, vector(rows.y[k]))
-    _, c_ddot = product_rates(N, n)
-    _, along = product_rates(N, span_rates(markers, a, b))
-    c_dot = dot(N[2], n[0]) + dot(N[0], n[2])
+    _, _, _, s, _ = rim(rows, markers, k, a, b)
+    N = rates_of(of_a(rows.z[k]), markers, a, b)
+    c, c_dot, c_ddot = dot_rates(N, rates_of(of_b(rows.y[k]), markers, a, b))
+    _, _, along = dot_rates(N, rates_of(A_TO_B, markers, a, b))
     s_ddot = -(c_dot * c_dot + c * c_ddot) / s - c * c * c_dot * c_dot / (s * s * s)
     return 0.0, along - rows.c[k] * s_ddot
 

@@ -1,7 +1,8 @@
 """The formulas of each kind of joint row, by its code: the compiled part of the record `ROW_KINDS`.
 
-A constraint has the functions `value` and `rates` (held_rows.py), a row that defines the wrench has `value` and
-`derivatives` (wrench_rows.py). Kernels call them by the code of the row and need to know nothing else about it.
+A constraint is a product of two vectors or has the functions `value` and `rates` (held_rows.py), a row that defines the
+wrench has `value` and `derivatives` (wrench_rows.py). Kernels call them by the code of the row and need to know nothing
+else about it.
 
 Described in `floatframe.model.joints.lower_pairs`, `floatframe.model.joints.orientation_joints`,
 `floatframe.model.joints.point_joints`.
@@ -10,7 +11,7 @@ Described in `floatframe.model.joints.lower_pairs`, `floatframe.model.joints.ori
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.compiler.compilation import small
 from floatframe.engine.kernels.joints import (
     constant_velocity,
     deformed_line,
@@ -19,6 +20,8 @@ from floatframe.engine.kernels.joints import (
     rolling,
     wrench_rows,
 )
+from floatframe.engine.kernels.joints.held_rows import gap_of, gradient_of, motion_rate, product_rates, rate_in_time
+from floatframe.engine.kernels.joints.relative_motion import rate_along
 from floatframe.model.joints.rows.kinds import (
     ARM,
     BISECTOR,
@@ -50,8 +53,11 @@ __all__ = [
     "WRENCH",
     "by_code",
     "held_by_place",
+    "held_gap",
+    "held_rate",
     "held_rates",
     "held_value",
+    "row_product",
     "wrench_derivatives",
     "wrench_value",
 ]
@@ -61,7 +67,7 @@ __all__ = [
 
 
 def by_code(name: str, functions: Mapping[int, Callable[..., Any]], arguments: str) -> Callable[..., Any]:
-    """Return the inner function name(code, ...) that calls the function with this code.
+    """Return the inlined function name(code, ...) that calls the function with this code.
 
     All functions take the named arguments and return the same types; only codes of the table may be passed. Each such
     function needs a name of its own: the symbols of two functions with the same name and types differ only by a number
@@ -79,7 +85,7 @@ def by_code(name: str, functions: Mapping[int, Callable[..., Any]], arguments: s
     names: dict[str, Any] = {f"f_{k}": function for k, function in enumerate(different)}
     names["__name__"] = __name__  # the module is a part of the symbol by which stored code is found
     exec("\n".join(lines), names)
-    return inner(names[name])
+    return small(names[name])
 
 
 # row formulas ---------------------------------------------------------------------------------------------------------
@@ -93,8 +99,55 @@ class Held(NamedTuple):
 
     value: Function  #: returns the value, (model, work, k, a, b) -> g, n, m_a, m_b
     rates: Function  #: returns the rates, (model, work, k, a, b) -> dg/dt, beta
+    gap: Function  #: returns g alone, with the same arguments
+    rate: Function  #: returns the rate of g alone
     #: for velocity constraints: writes derivatives by positions, (model, work, k, a, b, by)
     by_place: Function | None = None
+
+
+def own_name(function: Function, name: str) -> Function:
+    """Return a function under a name of its own, for the reason that `by_code` states."""
+    function.__name__ = function.__qualname__ = name
+    return small(function)
+
+
+def product_row(product: Function) -> Held:
+    """Return the functions of a kind that is a product, (model, k, t) -> Product, see held_rows.py."""
+
+    def value(model, work, k, a, b):
+        one = product(model, k, work.state.time)
+        n, m_a, m_b = gradient_of(one, work.markers, a, b)
+        return gap_of(one, work.markers, a, b), n, m_a, m_b
+
+    def rates(model, work, k, a, b):
+        return product_rates(product(model, k, work.state.time), work.markers, a, b)
+
+    def gap(model, work, k, a, b):
+        return gap_of(product(model, k, work.state.time), work.markers, a, b)
+
+    def rate(model, work, k, a, b):
+        one, driven = product(model, k, work.state.time), 0.0
+        if model.rows.motion[k] >= 0:
+            driven = rate_in_time(one, work.markers, a, b)
+        return motion_rate(one, work.markers, a, b) + driven
+
+    return Held(*(own_name(each, f"{product.py_func.__name__}_{each.__name__}") for each in (value, rates, gap, rate)))
+
+
+def other_row(value: Function, rates: Function, by_place: Function | None = None) -> Held:
+    """Return the functions of a kind from its value and rates."""
+
+    def gap(model, work, k, a, b):
+        g, _, _, _ = value(model, work, k, a, b)
+        return g
+
+    def rate(model, work, k, a, b):
+        _, n, m_a, m_b = value(model, work, k, a, b)
+        in_time, _ = rates(model, work, k, a, b)
+        return in_time + rate_along(work.markers, a, b, n, m_a, m_b)
+
+    name = value.py_func.__name__
+    return Held(value, rates, *(own_name(each, f"{name}_{each.__name__}") for each in (gap, rate)), by_place)
 
 
 class Wrench(NamedTuple):
@@ -104,22 +157,23 @@ class Wrench(NamedTuple):
     derivatives: Function  #: writes the derivatives, (model, work, k, a, b, w, c_k, by, V)
 
 
-TURNS = Held(held_rows.turn_value, held_rows.angle_rates)
 GAUGES = Wrench(wrench_rows.gauge_value, wrench_rows.gauge_derivatives)
 LOADED = Wrench(loaded_rows.loaded_value, loaded_rows.loaded_derivatives)
-HELD = {
-    POINT: Held(held_rows.point_value, held_rows.point_rates),
-    DOT: Held(held_rows.dot_value, held_rows.angle_rates),
-    TURN: TURNS,
-    TURN_B: TURNS,
-    SLIDE: Held(held_rows.slide_value, held_rows.slide_rates),
-    DISTANCE: Held(held_rows.distance_value, held_rows.distance_rates),
-    SCREW: Held(held_rows.screw_value, held_rows.screw_rates),
-    RIM_HEIGHT: Held(rolling.height_value, rolling.height_rates),
-    ROLL: Held(rolling.roll_value, rolling.roll_rates, rolling.roll_by_place),
-    EQUAL_TURN: Held(constant_velocity.equal_turn_value, constant_velocity.equal_turn_rates),
-    LINE: Held(deformed_line.line_value, deformed_line.line_rates),
-    LINE_TURN: Held(deformed_line.line_turn_value, deformed_line.line_turn_rates),
+PRODUCTS = {
+    POINT: held_rows.point,
+    DOT: held_rows.dot_product,
+    TURN: held_rows.turn,
+    TURN_B: held_rows.turn_about_b,
+    SLIDE: held_rows.slide,
+    DISTANCE: held_rows.length,
+}
+HELD = {code: product_row(product) for code, product in PRODUCTS.items()} | {
+    SCREW: other_row(held_rows.screw_value, held_rows.screw_rates),
+    RIM_HEIGHT: other_row(rolling.height_value, rolling.height_rates),
+    ROLL: other_row(rolling.roll_value, rolling.roll_rates, rolling.roll_by_place),
+    EQUAL_TURN: other_row(constant_velocity.equal_turn_value, constant_velocity.equal_turn_rates),
+    LINE: other_row(deformed_line.line_value, deformed_line.line_rates),
+    LINE_TURN: other_row(deformed_line.line_turn_value, deformed_line.line_turn_rates),
 }
 WRENCH = {
     GAUGE: GAUGES,
@@ -135,6 +189,9 @@ WRENCH = {
     TWIST_B: LOADED,
 }
 
+row_product = by_code("row_product", PRODUCTS, "model, k, t")
+held_gap = by_code("held_gap", {code: kind.gap for code, kind in HELD.items()}, "model, work, k, a, b")
+held_rate = by_code("held_rate", {code: kind.rate for code, kind in HELD.items()}, "model, work, k, a, b")
 held_value = by_code("held_value", {code: kind.value for code, kind in HELD.items()}, "model, work, k, a, b")
 held_rates = by_code("held_rates", {code: kind.rates for code, kind in HELD.items()}, "model, work, k, a, b")
 held_by_place = by_code(

@@ -14,6 +14,7 @@ velocities: their impulse is exactly h Q, and their work h Q times the rate.
 import math
 
 from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.joints.held_rows import A_TO_B, of_a
 from floatframe.engine.kernels.joints.relative_motion import coordinate_at
 from floatframe.engine.kernels.vector import add, cross, dot, norm, scaled, sub, vector
 from floatframe.engine.structure_preserving.kernels.markers import (
@@ -25,7 +26,7 @@ from floatframe.engine.structure_preserving.kernels.markers import (
     mean_direction,
     turning,
 )
-from floatframe.engine.structure_preserving.kernels.rows import add_slide, angle_loads
+from floatframe.engine.structure_preserving.kernels.rows import add_product, angle_loads
 from floatframe.model.joints.rows.kinds import PUSH, SPAN, TWIST_B
 
 __all__ = ["add_coordinate_force", "add_impulsive_force", "coordinate_change", "coordinate_ends",
@@ -77,7 +78,7 @@ def add_coordinate_force(model, discrete, step, k, a, b, Q):
     """Add the loads of a force or torque Q along the coordinate of row k."""
     kind = model.rows.kind[k]
     if kind == PUSH:
-        add_slide(model, discrete, step, a, b, vector(model.rows.x[k]), Q)
+        add_product(model, discrete, step, a, b, of_a(model.rows.x[k]), A_TO_B, Q)
     elif kind == SPAN:
         _, e = span(step, a, b)
         add_pair(step, a, b, scaled(Q, e))

@@ -40,6 +40,7 @@ from floatframe.engine.kernels.joints.deformed_line import (
     twist,
     unit_normal,
 )
+from floatframe.engine.kernels.joints.held_rows import of_a, of_b
 from floatframe.engine.kernels.joints.relative_motion import direction, distance
 from floatframe.engine.kernels.marker import shape_sum
 from floatframe.engine.kernels.rotation import exp_matrix
@@ -252,7 +253,7 @@ def add_line_reaction(model, discrete, step, k, a, b, f):
     if model.rows.kind[k] != LINE_TURN:
         add_pair(step, a, b, scaled(f, mean_normal(model, step, k, a)))
         return
-    add_product(model, discrete, step, a, vector(model.rows.x[k]), b, vector(model.rows.y[k]), f)
+    add_product(model, discrete, step, a, b, of_a(model.rows.x[k]), of_b(model.rows.y[k]), f)
     line = model.markers.line[a]
     if model.lines.row[line] < 0:
         t = vector(step.line_t[line])

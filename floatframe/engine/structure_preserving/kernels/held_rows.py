@@ -4,6 +4,7 @@ import math
 
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.coordinate import ends_and_row, indices_of
+from floatframe.engine.kernels.joints.held_rows import A_TO_B, of_a, of_b
 from floatframe.engine.kernels.vector import add, cross, dot, norm, scaled, sub, vector
 from floatframe.engine.structure_preserving.kernels import deformed_lines, rows
 from floatframe.engine.structure_preserving.kernels.coordinates import (
@@ -19,7 +20,7 @@ from floatframe.engine.structure_preserving.kernels.markers import (
     ends,
     mean_direction,
 )
-from floatframe.engine.structure_preserving.kernels.rows import add_product, add_slide, held, mean_distance
+from floatframe.engine.structure_preserving.kernels.rows import add_product, held, mean_distance
 from floatframe.model.joints.rows.kinds import COUPLE, LINE, LINE_TURN, RIM_HEIGHT, ROLL
 
 __all__ = ["add_reaction", "row_change", "row_rate", "row_value"]
@@ -147,9 +148,9 @@ def slope(model, step, k, a, b):
 @inner
 def add_height_reaction(model, discrete, step, k, a, b, f):
     """Add the loads of the height constraint with multiplier f."""
-    z, y = vector(model.rows.z[k]), vector(model.rows.y[k])
-    add_slide(model, discrete, step, a, b, z, f)
-    add_product(model, discrete, step, a, z, b, y, f * slope(model, step, k, a, b))
+    N = of_a(model.rows.z[k])
+    add_product(model, discrete, step, a, b, N, A_TO_B, f)
+    add_product(model, discrete, step, a, b, N, of_b(model.rows.y[k]), f * slope(model, step, k, a, b))
 
 
 @inner

@@ -14,7 +14,6 @@ from floatframe.engine.kernels.joints.coordinate_force import excess, given_forc
 from floatframe.engine.kernels.joints.loaded_rows import normal_part
 from floatframe.engine.kernels.time_function import time_function
 from floatframe.engine.kernels.vector import (
-    add,
     cross,
     dot,
     matrix,
@@ -34,14 +33,17 @@ from floatframe.engine.structure_preserving.kernels.coordinates import (
     coordinate_rate,
     span,
 )
+from floatframe.engine.structure_preserving.kernels.held_rows import add_reaction
 from floatframe.engine.structure_preserving.kernels.markers import (
     add_force,
     add_moment,
     add_pair,
+    begin_unit_load,
+    end_unit_load,
     mean_direction,
     turning,
 )
-from floatframe.engine.structure_preserving.kernels.rows import force_of_row, mean_distance
+from floatframe.engine.structure_preserving.kernels.rows import mean_distance
 from floatframe.model.joints.rows.kinds import PUSH
 
 __all__ = ["body_load", "coordinate_load", "normal_force", "point_load", "spring_load"]
@@ -107,11 +109,11 @@ def body_load(model, discrete, step, k):
 def normal_force(model, discrete, step, c, k):
     """Return the size of the joint force in c normal to the axis of row k."""
     a, b = model.connections.a[c], model.connections.b[c]
-    F = (0.0, 0.0, 0.0)
+    begin_unit_load(step, a, b)
     for j in range(discrete.first[c], discrete.first[c + 1]):
-        row = discrete.row[j]
-        if model.rows.is_length[row]:
-            F = add(F, scaled(step.f[j], force_of_row(model, step, row, a, b)))
+        add_reaction(model, discrete, step, c, discrete.row[j], step.f[j])
+    F = vector(step.F[1, b])
+    end_unit_load(model, step, a, b)
     x = vector(model.rows.x[k])
     axis = x if model.rows.kind[k] == PUSH else cross(x, vector(model.rows.z[k]))
     normal, _ = normal_part(F, mean_direction(step, a, axis))

@@ -10,9 +10,21 @@ angular momentum.
 import math
 
 from floatframe.engine.kernels.compiler.compilation import inner
-from floatframe.engine.kernels.joints.held_rows import directions
-from floatframe.engine.kernels.joints.relative_motion import distance, prescribed_at
-from floatframe.engine.kernels.joints.row_formulas import HELD, by_code
+from floatframe.engine.kernels.joints.constant_velocity import equal_turn_products
+from floatframe.engine.kernels.joints.held_rows import (
+    A_TO_B,
+    OF_A,
+    OF_BOTH,
+    OF_GROUND,
+    ZERO,
+    Product,
+    Side,
+    gap_of,
+    of_a,
+    rate_in_time,
+)
+from floatframe.engine.kernels.joints.relative_motion import prescribed_at
+from floatframe.engine.kernels.joints.row_formulas import HELD, by_code, row_product
 from floatframe.engine.kernels.vector import add, cross, dot, scaled, turned, vector
 from floatframe.engine.structure_preserving.kernels.markers import (
     add_direction,
@@ -21,27 +33,15 @@ from floatframe.engine.structure_preserving.kernels.markers import (
     ends,
     mean_direction,
 )
-from floatframe.model.joints.rows.kinds import (
-    DISTANCE,
-    DOT,
-    EQUAL_TURN,
-    POINT,
-    RIM_HEIGHT,
-    SCREW,
-    SLIDE,
-    TURN,
-    TURN_B,
-)
+from floatframe.engine.structure_preserving.kernels.records import MarkerPlaces
+from floatframe.model.joints.rows.kinds import EQUAL_TURN, RIM_HEIGHT, SCREW
 
-__all__ = ["add_reaction", "add_slide", "angle_loads", "force_of_row", "held", "mean_distance",
-           "row_rate", "row_value"]  # fmt: skip
+__all__ = ["add_product", "add_reaction", "angle_loads", "held", "mean_distance", "row_rate", "row_value"]
 
 
-#: the value function of rows that depend only on positions and time, shared with all other formulations
-value_of_places = by_code(
-    "value_of_places",
-    {code: HELD[code].value for code in (DOT, TURN, TURN_B, SLIDE, DISTANCE, SCREW, RIM_HEIGHT, EQUAL_TURN)},
-    "model, work, k, a, b",
+#: the value of rows that are not one product, shared with all other formulations
+value_of_others = by_code(
+    "value_of_others", {code: HELD[code].value for code in (SCREW, RIM_HEIGHT, EQUAL_TURN)}, "model, work, k, a, b"
 )
 
 
@@ -53,19 +53,18 @@ def held(model, k, t):
 
 
 @inner
-def slide_axis(model, k):
-    """Return the axis in A along which row k measures its distance."""
-    x = vector(model.rows.x[k])
-    return cross(x, vector(model.rows.z[k])) if model.rows.kind[k] == SCREW else x
+def product_of_step(model, step, k, a, b, t):
+    """Return the product of row k; the direction of a POINT row starts in the axes of the body of A, or of B.
 
-
-@inner
-def point_axis(model, step, k, a, b):
-    """Return the ground direction of a POINT row, fixed at the start of the step in the body of A, or of B."""
+    So the matrix of Newton's method does not rotate with the body.
+    """
+    one = row_product(model.rows.kind[k], model, k, t)
+    if one.P.of != OF_GROUND:
+        return one
     i = model.markers.body[a]
     if i < 0:
         i = model.markers.body[b]
-    return turned(step.R_0[i], vector(model.rows.x[k]))
+    return Product(Side(OF_GROUND, turned(step.R_0[i], one.P.e), ZERO, ZERO), one.Q, one.c, one.o)
 
 
 @inner
@@ -78,66 +77,63 @@ def mean_distance(step, a, b):
 @inner
 def row_value(model, step, k, a, b):
     """Return the value of row k at the end of the step."""
-    if model.rows.kind[k] == POINT:
-        d = distance(step.end.markers, a, b)
-        return dot(d, point_axis(model, step, k, a, b))
-    value, _, _, _ = value_of_places(model.rows.kind[k], model, step.end, k, a, b)
-    return value
-
-
-@inner
-def force_of_row(model, step, k, a, b):
-    """Return the force on B for a unit multiplier of a distance row k."""
     kind = model.rows.kind[k]
-    if kind == POINT:
-        return point_axis(model, step, k, a, b)
-    if kind == DISTANCE:
-        value, _ = held(model, k, step.t_force)
-        return scaled(1.0 / value, mean_distance(step, a, b))
-    return mean_direction(step, a, slide_axis(model, k))
+    if kind == SCREW or kind == RIM_HEIGHT or kind == EQUAL_TURN:
+        value, _, _, _ = value_of_others(kind, model, step.end, k, a, b)
+        return value
+    return gap_of(product_of_step(model, step, k, a, b, step.end.state.time), step.end.markers, a, b)
 
 
 @inner
 def add_reaction(model, discrete, step, k, a, b, f):
     """Add the loads of row k with multiplier f, whose work is f times the change of the row."""
     kind = model.rows.kind[k]
-    if kind == SLIDE or kind == SCREW:
-        add_slide(model, discrete, step, a, b, slide_axis(model, k), f)
-        if kind == SCREW:
-            angle_loads(model, discrete, step, k, a, b, -model.rows.c[k] * f)
-        return
-    if model.rows.is_length[k]:
-        add_pair(step, a, b, scaled(f, force_of_row(model, step, k, a, b)))
-        return
-    e, y = directions(model, k, step.t_force)
-    add_product(model, discrete, step, a, e[0], b, y[0], f)
-    if kind == EQUAL_TURN:
-        add_product(model, discrete, step, a, vector(model.rows.z[k]), b, vector(model.rows.y[k]), -f)
+    if kind == SCREW:
+        axis = cross(vector(model.rows.x[k]), vector(model.rows.z[k]))
+        add_product(model, discrete, step, a, b, of_a(axis), A_TO_B, f)
+        angle_loads(model, discrete, step, k, a, b, -model.rows.c[k] * f)
+    elif kind == EQUAL_TURN:
+        first, second = equal_turn_products(model.rows, k)
+        add_product(model, discrete, step, a, b, first.P, first.Q, f)
+        add_product(model, discrete, step, a, b, second.P, second.Q, -f)
+    else:
+        one = product_of_step(model, step, k, a, b, step.t_force)
+        add_product(model, discrete, step, a, b, one.P, one.Q, one.c[0] * f)
 
 
 @inner
-def add_product(model, discrete, step, a, e, b, y, f):
-    """Add the loads of f times the product of direction e of marker a and y of marker b."""
-    E, D = mean_direction(step, a, e), mean_direction(step, b, y)
-    add_direction(model, discrete, step, a, e, scaled(f, D))
-    add_direction(model, discrete, step, b, y, scaled(f, E))
+def add_product(model, discrete, step, a, b, P, Q, f):
+    """Add the loads of f times P · Q, whose work is f times the change of P · Q."""
+    P_mean, Q_mean = mean_vector(step, a, b, P), mean_vector(step, a, b, Q)
+    add_vector(model, discrete, step, a, b, P, scaled(f, Q_mean))
+    add_vector(model, discrete, step, a, b, Q, scaled(f, P_mean))
+
+
+@inner
+def mean_vector(step, a, b, side):
+    """Return the mean of a vector of a product over the step."""
+    if side.of == OF_BOTH:
+        return mean_distance(step, a, b)
+    if side.of == OF_GROUND:
+        return side.e
+    return mean_direction(step, a if side.of == OF_A else b, side.e)
+
+
+@inner
+def add_vector(model, discrete, step, a, b, side, G):
+    """Add a load on a vector P of a product, with the work G · dP."""
+    if side.of == OF_BOTH:
+        add_pair(step, a, b, G)
+    elif side.of != OF_GROUND:
+        add_direction(model, discrete, step, a if side.of == OF_A else b, side.e, G)
 
 
 @inner
 def row_rate(model, step, k, a, b, t):
     """Return the explicit time derivative of row k at the beginning of a step, due to its prescribed motion."""
-    kind = model.rows.kind[k]
     if model.rows.motion[k] < 0:
         return 0.0
-    value, rate = held(model, k, t)
-    if kind == SLIDE:
-        return -rate
-    if kind == DISTANCE:
-        d, _ = distances(step, a, b)
-        return -0.5 * rate * (dot(d, d) / (value * value) + 1.0)
-    e, y = directions(model, k, t)
-    A_a, A_b = step.A_0[a], step.A_0[b]
-    return dot(turned(A_a, e[1]), turned(A_b, y[0])) + dot(turned(A_a, e[0]), turned(A_b, y[1]))
+    return rate_in_time(row_product(model.rows.kind[k], model, k, t), MarkerPlaces(step.x_0, step.A_0), a, b)
 
 
 @inner
@@ -164,11 +160,3 @@ def angle_loads(model, discrete, step, k, a, b, f):
     add_direction(model, discrete, step, a, vector(model.rows.z[k]), scaled(-f * S, D))
     both = add(scaled(C, E), scaled(S, Z))
     add_direction(model, discrete, step, b, vector(model.rows.y[k]), scaled(-f, both))
-
-
-@inner
-def add_slide(model, discrete, step, a, b, x, f):
-    """Add the loads of force f along axis x of A, whose work is f times the change of distance along x."""
-    E, d = mean_direction(step, a, x), mean_distance(step, a, b)
-    add_pair(step, a, b, scaled(f, E))
-    add_direction(model, discrete, step, a, x, scaled(f, d))

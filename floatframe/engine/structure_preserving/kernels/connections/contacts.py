@@ -14,6 +14,7 @@ import math
 
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.contact import V_0, contact_gap
+from floatframe.engine.kernels.joints.held_rows import A_TO_B, of_a
 from floatframe.engine.kernels.vector import add, cross, dot, norm, scaled, sub, vector
 from floatframe.engine.structure_preserving.kernels.coordinates import span
 from floatframe.engine.structure_preserving.kernels.markers import (
@@ -24,7 +25,7 @@ from floatframe.engine.structure_preserving.kernels.markers import (
     mean_direction,
     turning,
 )
-from floatframe.engine.structure_preserving.kernels.rows import add_slide, mean_distance
+from floatframe.engine.structure_preserving.kernels.rows import add_product, mean_distance
 
 __all__ = ["contact_load", "speed_of_approach"]
 
@@ -69,7 +70,7 @@ def add_normal_force(model, discrete, step, c, f):
         _, N = span(step, a, b)
         add_pair(step, a, b, scaled(f, N))
         return N
-    add_slide(model, discrete, step, a, b, x, f)
+    add_product(model, discrete, step, a, b, of_a(x), A_TO_B, f)
     return mean_direction(step, a, x)
 
 
