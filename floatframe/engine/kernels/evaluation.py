@@ -8,13 +8,8 @@ from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.connection import connection_derivatives, connection_rows
 from floatframe.engine.kernels.dense import rows_of
 from floatframe.engine.kernels.joints.deformed_line import slide_marker
-from floatframe.engine.kernels.marker import (
-    acceleration_columns,
-    marker_columns,
-    marker_motion,
-    marker_stiffness,
-    wrench_to_body,
-)
+from floatframe.engine.kernels.marker import marker_columns, marker_motion, marker_stiffness, wrench_to_body
+from floatframe.engine.kernels.marker_acceleration import acceleration_columns
 from floatframe.engine.kernels.rotation import right_jacobian, spin_jacobian
 from floatframe.engine.kernels.time_function import time_function
 from floatframe.engine.kernels.vector import put, put_matrix, put_sum, scaled, turned, turned_back, vector

@@ -26,7 +26,6 @@ from floatframe.engine.kernels.vector import (
     put_matrix,
     put_sum,
     scaled,
-    sub,
     turned,
     turned_back,
     unit,
@@ -34,8 +33,8 @@ from floatframe.engine.kernels.vector import (
 )
 
 __all__ = [
-    "acceleration_columns", "bent_bias", "marker_acceleration", "marker_acceleration_bias", "marker_columns",
-    "marker_motion", "marker_stiffness", "pose_on_body", "shapes_of", "wrench_to_body",
+    "bent_bias", "bent_by", "bent_rate", "body_omega", "marker_columns", "marker_motion", "marker_stiffness",
+    "pose_on_body", "shape", "shape_sum", "shapes_of", "wrench_to_body",
 ]  # fmt: skip
 
 
@@ -164,95 +163,6 @@ def bent_bias(model, work, m, i):
     bent_rate(model, work, m, i, bend_dot)
     d, th = shape_sum(bend_dot, work.state.u[u0 : u0 + n])
     return scaled(-1.0, d), scaled(-1.0, th)
-
-
-@loops
-def marker_acceleration_bias(model, work, m, out):
-    """Write the acceleration (3) and angular acceleration (3) of marker m at zero u_dot into out, ground axes.
-
-    R (omega × (omega × rho + 2 rho_dot) + b_t) and R (omega × nu + (dT'/dth [th_dot]) th_dot + T' b_r), where
-    b = -q_dotᵀ K_P q_dot.
-    """
-    out[:] = 0.0
-    i = model.markers.body[m]
-    if i < 0:
-        return
-    R, omega = work.state.R[i], body_omega(model.bodies, work.state, i)
-    rho, rho_dot = vector(work.markers.rho[m]), vector(work.markers.rho_dot[m])
-    b_t, b_r = bent_bias(model, work, m, i)
-    spun = cross(omega, add(cross(omega, rho), scaled(2.0, rho_dot)))
-    put(out, 0, turned(R, add(spun, b_t)))
-    if model.markers.psi0[m] >= 0:
-        th_dot, nu = vector(work.markers.angle_dot[m]), vector(work.markers.spin[m])
-        slope = left_jacobian_derivative(vector(work.markers.angle[m]), th_dot, 1.0)
-        own = add(turned(slope, th_dot), turned(work.markers.T_left[m], b_r))
-        put(out, 3, turned(R, add(cross(omega, nu), own)))
-
-
-@loops
-def marker_acceleration(model, work, m, out):
-    """Write the acceleration (3) and angular acceleration (3) of marker m at the iterate into out, ground axes."""
-    marker_acceleration_bias(model, work, m, out)
-    i = model.markers.body[m]
-    if i < 0:
-        return
-    R, u_dot = work.state.R[i], work.state.u_dot[model.bodies.u0[i] :]
-    turn = vector(u_dot[3:])
-    move = cross(turn, vector(work.markers.rho[m]))
-    if model.markers.psi0[m] >= 0:
-        d, th = shape_sum(shapes_of(model, work.markers.psi, m), u_dot[6:])
-        move, turn = add(move, d), add(turn, turned(work.markers.T_left[m], th))
-    put_sum(out, 0, add(vector(u_dot), turned(R, move)))
-    put_sum(out, 3, turned(R, turn))
-
-
-@loops
-def acceleration_columns(model, work, m, weights, turning, row):
-    """Write c_k times the derivatives of marker m's acceleration by the unknowns of a step, body axes.
-
-    They are written into row, (6, 6 + n). In a step, accelerations change by c_m/c_k and velocities by c_d/c_k times
-    the change of the unknowns, and the body rotates by `turning` dtheta. Without the acceleration of the frame origin,
-    in body axes,
-
-        a = omega_dot × rho + Psi_t q_ddot + omega × (omega × rho + 2 rho_dot) - q_dotᵀ K_P,t q_dot
-        alpha = omega_dot + T' Psi_r q_ddot + omega × nu + ...
-
-    In alpha, the derivatives of T' and its rate by q and q_dot are omitted: they are of the size of elastic rotations.
-    """
-    c_m, c_d, c_k = weights
-    i = model.markers.body[m]
-    n, u0, omega = model.bodies.n_q[i], model.bodies.u0[i], body_omega(model.bodies, work.state, i)
-    R, rho, rho_dot = work.state.R[i], vector(work.markers.rho[m]), vector(work.markers.rho_dot[m])
-    omega_dot, nu = vector(work.state.u_dot[u0 + 3 :]), vector(work.markers.spin[m])
-    now = work.markers.acceleration[model.markers.accelerated[m]]
-    of_frame = vector(work.state.u_dot[u0:])
-    a, alpha = turned_back(R, sub(vector(now), of_frame)), turned_back(R, vector(now[3:]))
-    row[:, :] = 0.0
-    for b in range(3):
-        t, e = scaled(c_k, (turning[0, b], turning[1, b], turning[2, b])), unit(b)
-        row[b, b] = c_m
-        by_spin = add(cross(e, add(cross(omega, rho), scaled(2.0, rho_dot))), cross(omega, cross(e, rho)))
-        put_column(row, 0, 3 + b, add(add(scaled(c_m, cross(e, rho)), scaled(c_d, by_spin)), cross(t, a)))
-        put_column(row, 3, 3 + b, add(add(scaled(c_m, e), scaled(c_d, cross(e, nu))), cross(t, alpha)))
-    if model.markers.psi0[m] < 0:
-        return
-    psi, T, is_bent = shapes_of(model, work.markers.psi, m), work.markers.T_left[m], model.markers.bend0[m] >= 0
-    bend_dot, bend_ddot = matrix_at(work.markers.bend_dot, 0, 6, n), matrix_at(work.markers.bend_ddot, 0, 6, n)
-    if is_bent:
-        bent_rate(model, work, m, i, bend_dot)
-        bent_by(model, m, work.state.u_dot[u0 + 6 : u0 + 6 + n], bend_ddot)
-    for k in range(n):
-        d, th = shape(psi, k)
-        turn = turned(T, th)
-        by_rate = scaled(2.0, cross(omega, d))
-        by_place = add(cross(omega_dot, d), cross(omega, cross(omega, d)))
-        if is_bent:
-            d_dot, _ = shape(bend_dot, k)
-            d_ddot, _ = shape(bend_ddot, k)
-            by_rate = sub(by_rate, scaled(2.0, d_dot))
-            by_place = sub(by_place, add(d_ddot, scaled(2.0, cross(omega, d_dot))))
-        put_column(row, 0, 6 + k, add(add(scaled(c_m, d), scaled(c_d, by_rate)), scaled(c_k, by_place)))
-        put_column(row, 3, 6 + k, add(scaled(c_m, turn), scaled(c_d, cross(omega, turn))))
 
 
 @small

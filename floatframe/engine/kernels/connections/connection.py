@@ -30,7 +30,7 @@ from floatframe.engine.kernels.joints.row_formulas import (
     wrench_derivatives,
     wrench_value,
 )
-from floatframe.engine.kernels.marker import marker_acceleration_bias
+from floatframe.engine.kernels.marker_acceleration import marker_acceleration_bias
 from floatframe.engine.kernels.model import COUPLER, ELEMENT, JOINT, USER_FORCE
 from floatframe.engine.kernels.vector import dot, put, put_sum, scaled, sub, vector
 from floatframe.model.joints.rows.kinds import NOTHING, POSITION, VELOCITY

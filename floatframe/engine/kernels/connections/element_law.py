@@ -26,7 +26,7 @@ from floatframe.engine.kernels.compiler.compilation import inner, view
 from floatframe.engine.kernels.compiler.user_call import call_law
 from floatframe.engine.kernels.connections.user_force import note_no_number, put_state_derivatives, state_rows
 from floatframe.engine.kernels.dense import matrix_at
-from floatframe.engine.kernels.marker import marker_acceleration
+from floatframe.engine.kernels.marker_acceleration import marker_acceleration
 from floatframe.engine.kernels.rotation import exp_matrix
 from floatframe.engine.kernels.vector import (
     add,

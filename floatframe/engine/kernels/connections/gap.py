@@ -22,7 +22,8 @@ from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.contact import contact_gap
 from floatframe.engine.kernels.connections.element_law import law_results, law_values
 from floatframe.engine.kernels.joints.relative_motion import distance, relative_velocity
-from floatframe.engine.kernels.marker import marker_acceleration, marker_motion, shape, shapes_of
+from floatframe.engine.kernels.marker import marker_motion, shape, shapes_of
+from floatframe.engine.kernels.marker_acceleration import marker_acceleration
 from floatframe.engine.kernels.model import ELEMENT, MASS, STIFFNESS
 from floatframe.engine.kernels.rotation import exp_matrix
 from floatframe.engine.kernels.vector import (

@@ -10,7 +10,7 @@ Described in `floatframe.integrators.relative_ode`.
 from floatframe.engine.kernels.body import NewtonWeights
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.connection import connection_rates
-from floatframe.engine.kernels.marker import marker_acceleration
+from floatframe.engine.kernels.marker_acceleration import marker_acceleration
 from floatframe.engine.tree.kernels.evaluation import evaluate_tree
 from floatframe.engine.tree.kernels.kinematics import move_joints, place_bodies
 from floatframe.engine.tree.kernels.tangent import write_tangent

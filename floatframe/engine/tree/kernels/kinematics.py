@@ -13,7 +13,8 @@ also if the body is at A. Deformations of both bodies, their rates and accelerat
 """
 
 from floatframe.engine.kernels.compiler.compilation import inner, loops
-from floatframe.engine.kernels.marker import elastic_motion, marker_acceleration, marker_motion
+from floatframe.engine.kernels.marker import elastic_motion, marker_motion
+from floatframe.engine.kernels.marker_acceleration import elastic_body_in_joint, marker_acceleration
 from floatframe.engine.kernels.rotation import exp_matrix
 from floatframe.engine.kernels.vector import (
     add,
@@ -31,7 +32,6 @@ from floatframe.engine.kernels.vector import (
     unit_matrix,
     vector,
 )
-from floatframe.engine.tree.kernels.elastic_turning import elastic_body_in_joint
 from floatframe.engine.tree.kernels.spins import turn_spinning_joint
 
 __all__ = ["column_screw", "end_motion", "joint_ends", "joint_motion", "move_joints", "place_bodies"]

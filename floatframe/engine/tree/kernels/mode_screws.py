@@ -11,9 +11,10 @@ with the spatial velocity V and its rate V' has xi = S theta and, with these rat
 from floatframe.engine.kernels.compiler.compilation import inner, small
 from floatframe.engine.kernels.dense import matrix_at
 from floatframe.engine.kernels.marker import bending_of, bent_by, bent_rate, shape, shapes_of
+from floatframe.engine.kernels.marker_acceleration import deformation_accelerations
 from floatframe.engine.kernels.rotation import left_jacobian_derivative
 from floatframe.engine.kernels.vector import add, cross, dot, scaled, sub, turned, turned_back, vector
-from floatframe.engine.tree.kernels.elastic_turning import deformation_accelerations, second_turning
+from floatframe.engine.tree.kernels.elastic_turning import second_turning
 from floatframe.engine.tree.kernels.spatial import pair_sum, scaled_pair, spatial_cross, world_screw
 
 __all__ = ["add_second_order", "mode_rate", "mode_screw", "mode_screws", "second_rates", "variation_rates"]

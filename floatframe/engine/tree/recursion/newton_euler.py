@@ -19,6 +19,7 @@ Sources: Walker & Orin (1982); Featherstone (2008), chapter 5; for bodies in flo
 from floatframe.engine.kernels.body import body_forces
 from floatframe.engine.kernels.compiler.compilation import loops, small
 from floatframe.engine.kernels.marker import shape, shapes_of
+from floatframe.engine.kernels.marker_acceleration import elastic_body_in_joint, elastic_carrier, spin_matrix
 from floatframe.engine.kernels.rotation import matrix_of_euler_parameters
 from floatframe.engine.kernels.vector import (
     add,
@@ -35,7 +36,6 @@ from floatframe.engine.kernels.vector import (
     unit_matrix,
     vector,
 )
-from floatframe.engine.tree.kernels.elastic_turning import elastic_body_in_joint, elastic_carrier, spin_matrix
 from floatframe.engine.tree.recursion.nodes import ROTATION, SCREW, TRANSLATION
 
 __all__ = ["newton_euler"]

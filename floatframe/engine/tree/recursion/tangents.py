@@ -24,6 +24,7 @@ Sources: Carpentier & Mansard (2018); Singh, Russell & Wensing (2022) for rigid 
 
 from floatframe.engine.kernels.body import NewtonWeights, body_tangent, moved_inertia
 from floatframe.engine.kernels.compiler.compilation import loops, small
+from floatframe.engine.kernels.marker_acceleration import elastic_carrier
 from floatframe.engine.kernels.vector import (
     add,
     add_block,
@@ -40,7 +41,6 @@ from floatframe.engine.kernels.vector import (
     vector,
 )
 from floatframe.engine.tree.kernels.body_jets import mode_row, momentum_of_modes, turning_of_momentum
-from floatframe.engine.tree.kernels.elastic_turning import elastic_carrier
 from floatframe.engine.tree.kernels.mode_screws import add_second_order, mode_screws, second_rates, variation_rates
 from floatframe.engine.tree.kernels.spatial import (
     pair,
