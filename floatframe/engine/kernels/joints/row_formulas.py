@@ -50,6 +50,7 @@ from floatframe.model.joints.rows.kinds import (
 
 __all__ = [
     "HELD",
+    "PRODUCTS",
     "WRENCH",
     "by_code",
     "held_by_place",
@@ -57,6 +58,7 @@ __all__ = [
     "held_rate",
     "held_rates",
     "held_value",
+    "own_name",
     "row_product",
     "wrench_derivatives",
     "wrench_value",

@@ -52,7 +52,7 @@ def add_reaction(model, discrete, step, c, k, f):
     elif kind == LINE or kind == LINE_TURN:
         deformed_lines.add_line_reaction(model, discrete, step, k, a, b, f)
     else:
-        rows.add_reaction(model, discrete, step, k, a, b, f)
+        rows.add_reaction(kind, model, discrete, step, k, a, b, f)
 
 
 @inner

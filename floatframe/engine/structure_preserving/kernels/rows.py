@@ -9,7 +9,7 @@ angular momentum.
 
 import math
 
-from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.compiler.compilation import inner, small
 from floatframe.engine.kernels.joints.constant_velocity import equal_turn_products
 from floatframe.engine.kernels.joints.held_rows import (
     A_TO_B,
@@ -21,10 +21,11 @@ from floatframe.engine.kernels.joints.held_rows import (
     Side,
     gap_of,
     of_a,
+    point,
     rate_in_time,
 )
 from floatframe.engine.kernels.joints.relative_motion import prescribed_at
-from floatframe.engine.kernels.joints.row_formulas import HELD, by_code, row_product
+from floatframe.engine.kernels.joints.row_formulas import HELD, PRODUCTS, by_code, own_name, row_product
 from floatframe.engine.kernels.vector import add, cross, dot, scaled, turned, vector
 from floatframe.engine.structure_preserving.kernels.markers import (
     add_direction,
@@ -34,15 +35,9 @@ from floatframe.engine.structure_preserving.kernels.markers import (
     mean_direction,
 )
 from floatframe.engine.structure_preserving.kernels.records import MarkerPlaces
-from floatframe.model.joints.rows.kinds import EQUAL_TURN, RIM_HEIGHT, SCREW
+from floatframe.model.joints.rows.kinds import EQUAL_TURN, POINT, RIM_HEIGHT, SCREW
 
 __all__ = ["add_product", "add_reaction", "angle_loads", "held", "mean_distance", "row_rate", "row_value"]
-
-
-#: the value of rows that are not one product, shared with all other formulations
-value_of_others = by_code(
-    "value_of_others", {code: HELD[code].value for code in (SCREW, RIM_HEIGHT, EQUAL_TURN)}, "model, work, k, a, b"
-)
 
 
 @inner
@@ -52,64 +47,17 @@ def held(model, k, t):
     return value, rate
 
 
-@inner
-def product_of_step(model, step, k, a, b, t):
-    """Return the product of row k; the direction of a POINT row starts in the axes of the body of A, or of B.
-
-    So the matrix of Newton's method does not rotate with the body.
-    """
-    one = row_product(model.rows.kind[k], model, k, t)
-    if one.P.of != OF_GROUND:
-        return one
-    i = model.markers.body[a]
-    if i < 0:
-        i = model.markers.body[b]
-    return Product(Side(OF_GROUND, turned(step.R_0[i], one.P.e), ZERO, ZERO), one.Q, one.c, one.o)
+# products of two vectors ----------------------------------------------------------------------------------------------
 
 
-@inner
+@small
 def mean_distance(step, a, b):
     """Return the mean of the vector from A to B over the step."""
     d_0, d_1 = distances(step, a, b)
     return scaled(0.5, add(d_0, d_1))
 
 
-@inner
-def row_value(model, step, k, a, b):
-    """Return the value of row k at the end of the step."""
-    kind = model.rows.kind[k]
-    if kind == SCREW or kind == RIM_HEIGHT or kind == EQUAL_TURN:
-        value, _, _, _ = value_of_others(kind, model, step.end, k, a, b)
-        return value
-    return gap_of(product_of_step(model, step, k, a, b, step.end.state.time), step.end.markers, a, b)
-
-
-@inner
-def add_reaction(model, discrete, step, k, a, b, f):
-    """Add the loads of row k with multiplier f, whose work is f times the change of the row."""
-    kind = model.rows.kind[k]
-    if kind == SCREW:
-        axis = cross(vector(model.rows.x[k]), vector(model.rows.z[k]))
-        add_product(model, discrete, step, a, b, of_a(axis), A_TO_B, f)
-        angle_loads(model, discrete, step, k, a, b, -model.rows.c[k] * f)
-    elif kind == EQUAL_TURN:
-        first, second = equal_turn_products(model.rows, k)
-        add_product(model, discrete, step, a, b, first.P, first.Q, f)
-        add_product(model, discrete, step, a, b, second.P, second.Q, -f)
-    else:
-        one = product_of_step(model, step, k, a, b, step.t_force)
-        add_product(model, discrete, step, a, b, one.P, one.Q, one.c[0] * f)
-
-
-@inner
-def add_product(model, discrete, step, a, b, P, Q, f):
-    """Add the loads of f times P · Q, whose work is f times the change of P · Q."""
-    P_mean, Q_mean = mean_vector(step, a, b, P), mean_vector(step, a, b, Q)
-    add_vector(model, discrete, step, a, b, P, scaled(f, Q_mean))
-    add_vector(model, discrete, step, a, b, Q, scaled(f, P_mean))
-
-
-@inner
+@small
 def mean_vector(step, a, b, side):
     """Return the mean of a vector of a product over the step."""
     if side.of == OF_BOTH:
@@ -119,7 +67,7 @@ def mean_vector(step, a, b, side):
     return mean_direction(step, a if side.of == OF_A else b, side.e)
 
 
-@inner
+@small
 def add_vector(model, discrete, step, a, b, side, G):
     """Add a load on a vector P of a product, with the work G · dP."""
     if side.of == OF_BOTH:
@@ -128,12 +76,29 @@ def add_vector(model, discrete, step, a, b, side, G):
         add_direction(model, discrete, step, a if side.of == OF_A else b, side.e, G)
 
 
-@inner
-def row_rate(model, step, k, a, b, t):
-    """Return the explicit time derivative of row k at the beginning of a step, due to its prescribed motion."""
-    if model.rows.motion[k] < 0:
-        return 0.0
-    return rate_in_time(row_product(model.rows.kind[k], model, k, t), MarkerPlaces(step.x_0, step.A_0), a, b)
+@small
+def add_product(model, discrete, step, a, b, P, Q, f):
+    """Add the loads of f times P · Q, whose work is f times the change of P · Q."""
+    P_mean, Q_mean = mean_vector(step, a, b, P), mean_vector(step, a, b, Q)
+    add_vector(model, discrete, step, a, b, P, scaled(f, Q_mean))
+    add_vector(model, discrete, step, a, b, Q, scaled(f, P_mean))
+
+
+@small
+def started(model, step, one, a, b):
+    """Return a product whose ground direction is fixed at the start of the step in the body of A, or of B.
+
+    So the matrix of Newton's method does not rotate with the body.
+    """
+    if one.P.of != OF_GROUND:
+        return one
+    i = model.markers.body[a]
+    if i < 0:
+        i = model.markers.body[b]
+    return Product(Side(OF_GROUND, turned(step.R_0[i], one.P.e), ZERO, ZERO), one.Q, one.c, one.o)
+
+
+# rows -----------------------------------------------------------------------------------------------------------------
 
 
 @inner
@@ -160,3 +125,61 @@ def angle_loads(model, discrete, step, k, a, b, f):
     add_direction(model, discrete, step, a, vector(model.rows.z[k]), scaled(-f * S, D))
     both = add(scaled(C, E), scaled(S, Z))
     add_direction(model, discrete, step, b, vector(model.rows.y[k]), scaled(-f, both))
+
+
+def reaction_of(product):
+    """Return the function of the reaction of a kind that is a product."""
+
+    def reaction(model, discrete, step, k, a, b, f):
+        one = started(model, step, product(model, k, step.t_force), a, b)
+        add_product(model, discrete, step, a, b, one.P, one.Q, one.c[0] * f)
+
+    return own_name(reaction, f"{product.py_func.__name__}_reaction")
+
+
+@inner
+def add_screw_reaction(model, discrete, step, k, a, b, f):
+    """Add the loads of a SCREW row."""
+    axis = cross(vector(model.rows.x[k]), vector(model.rows.z[k]))
+    add_product(model, discrete, step, a, b, of_a(axis), A_TO_B, f)
+    angle_loads(model, discrete, step, k, a, b, -model.rows.c[k] * f)
+
+
+@inner
+def add_equal_turn_reaction(model, discrete, step, k, a, b, f):
+    """Add the loads of an EQUAL_TURN row."""
+    first, second = equal_turn_products(model.rows, k)
+    add_product(model, discrete, step, a, b, first.P, first.Q, f)
+    add_product(model, discrete, step, a, b, second.P, second.Q, -f)
+
+
+#: the value of rows that depend only on positions and time, shared with all other formulations
+gap_of_places = by_code(
+    "gap_of_places",
+    {code: HELD[code].gap for code in (*PRODUCTS, SCREW, RIM_HEIGHT, EQUAL_TURN) if code != POINT},
+    "model, work, k, a, b",
+)
+#: adds the loads of row k with multiplier f, whose work is f times the change of the row
+add_reaction = by_code(
+    "add_reaction",
+    {code: reaction_of(product) for code, product in PRODUCTS.items()}
+    | {SCREW: add_screw_reaction, EQUAL_TURN: add_equal_turn_reaction},
+    "model, discrete, step, k, a, b, f",
+)
+
+
+@inner
+def row_value(model, step, k, a, b):
+    """Return the value of row k at the end of the step."""
+    kind = model.rows.kind[k]
+    if kind == POINT:
+        return gap_of(started(model, step, point(model, k, 0.0), a, b), step.end.markers, a, b)
+    return gap_of_places(kind, model, step.end, k, a, b)
+
+
+@inner
+def row_rate(model, step, k, a, b, t):
+    """Return the explicit time derivative of row k at the beginning of a step, due to its prescribed motion."""
+    if model.rows.motion[k] < 0:
+        return 0.0
+    return rate_in_time(row_product(model.rows.kind[k], model, k, t), MarkerPlaces(step.x_0, step.A_0), a, b)
