@@ -23,9 +23,10 @@ from cms.reduction.basis.free_basis import free_basis
 from cms.reduction.error_estimates import (
     enlarged_space,
     error_estimates,
-    inertia_loads,
+    guards_of,
     response_errors,
     response_loads,
+    static_loads,
 )
 from cms.reduction.mesh_error import mesh_errors
 from cms.reduction.reduction import reduce
@@ -192,8 +193,9 @@ def print_cost(n: int, n_modes: int) -> None:
         basis = free_basis(body, modes, families)
         mesh_errors(body, basis, 1)  # compiles
         errors = timed("estimates", lambda: error_estimates(families, modes, basis, basis.Phi, MEAN_AXES))
-        n_judged, loads = len(errors.frequency), (response_loads(body), inertia_loads(families))
-        timed("reduction errors", lambda: enlarged_space(families, basis, n_judged, *loads, has_statics=True))
+        n_judged, loads = len(errors.frequency), static_loads(families, None)
+        guards = guards_of(modes)
+        timed("reduction errors", lambda: enlarged_space(families, basis, n_judged, loads, guards, has_statics=True))
         timed("mesh errors", lambda: mesh_errors(body, basis, n_judged))
     print(f"{body.n_dof} dofs, {reduced.n_q} modes, {len(errors.frequency)} of them judged")
     for name, (clock, processor) in seconds.items():

@@ -46,12 +46,13 @@ class DisplacementColumns:
     def __matmul__(self, Z: Array) -> "DisplacementColumns":
         return DisplacementColumns(combine(self.X, Z), combine(self.KX, Z), combine(self.MX, Z), self.T @ Z)
 
-    def __getitem__(self, index: IntArray) -> "DisplacementColumns":
+    def __getitem__(self, index: IntArray | slice) -> "DisplacementColumns":
         return DisplacementColumns(self.X[:, index], self.KX[:, index], self.MX[:, index], self.T[:, index])
 
-    def beside(self, other: "DisplacementColumns") -> "DisplacementColumns":
-        """Return both blocks of columns side by side."""
-        return DisplacementColumns(*(beside(getattr(self, a), getattr(other, a)) for a in ("X", "KX", "MX", "T")))
+    def beside(self, *others: "DisplacementColumns") -> "DisplacementColumns":
+        """Return blocks of columns side by side."""
+        blocks = (self, *others)
+        return DisplacementColumns(*(beside(*(getattr(each, a) for each in blocks)) for a in ("X", "KX", "MX", "T")))
 
     def inner(self, other: "DisplacementColumns", omega2: float) -> Array:
         """Return selfᵀ (K + omega² M) other."""

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Protocol
 import numpy as np
 
 from cms.errors import ModeSetError
-from cms.linear_algebra.solvers.eigen import EigenResult
+from cms.linear_algebra.solvers.eigen import EigenResult, GuardModes
 from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.modes.families.families import Families
 from cms.modes.families.static_modes import boundary_names
@@ -52,6 +52,8 @@ class ModeSet:
         Group of each column, such as "constraint big_end"; default: the label without its last word.
     data
         Numerical data of the set, such as Hankel singular values.
+    guards
+        Approximate modes above the vibration modes of the set, for estimates of its error; None: not known.
     """
 
     name: str
@@ -61,6 +63,7 @@ class ModeSet:
     options: Mapping[str, str] = field(default_factory=dict)
     groups: tuple[str, ...] = ()
     data: Mapping[str, Array] = field(default_factory=dict)
+    guards: GuardModes | None = None
 
     def __post_init__(self) -> None:
         groups = tuple(self.groups) or tuple(label.rsplit(" ", 1)[0] for label in self.labels)
@@ -181,6 +184,7 @@ def mode_set(
         {**recorded, **(options or {})},
         tuple(group for block in blocks for group in block.groups),
         data or {},
+        None if modes is None else modes.guards,
     )
 
 

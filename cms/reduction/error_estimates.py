@@ -14,21 +14,23 @@ is K-orthogonal to V, because phi is a Galerkin solution.
     theta, so theta / lambda' - 1 never exceeds theta / lambda - 1. Of a mode j that V lacks, e has its part of phi
     times theta / lambda_j - 1, so that little of the error is missed below the cutoff.
     The error of a shape is its distance from the span of the new shapes whose frequencies are within 0.1 % of lambda'.
-(3) A mode that every phi lacks leaves no trace in e. A few random columns, M-orthogonal to V and smoothed by two steps
-    of inverse iteration, are added to the span, so that such a mode appears among the lambda'.
+(3) A mode that every phi lacks leaves no trace in e. The guard modes are added to the span, so that such a mode appears
+    among the lambda': approximate modes just above those of the set, which the eigensolver found beside them. A set
+    without guards gets a few random columns, M-orthogonal to V and smoothed by two steps of inverse iteration.
 (4) Responses. Let y solve Vᵀ (K - omega² M) V y = Vᵀ b. One step of inverse iteration with its residual,
     G [b - (K - omega² M) V y], has beside V the part of G b that is K-orthogonal to V, plus
     sum_j omega² / theta_j y_j e_j. The e_j of judged modes are in the span already. Above them y_j is nearly
     phi_jᵀ b / theta_j, because omega² is less than theta_j, and one column for each load has the sum of
     phi_jᵀ b / theta_j² e_j. The responses in the enlarged span and in V are compared.
-(5) Corrections by fewer solutions. All corrections are the parts beside V of G F, with one load f_j of F for each. Sets
-    of constraint modes and eigenmodes have corrections that span no more than n_h columns: K_II⁻¹ M Psi_C. So G is
-    applied to n_h random sums of the loads [2]_, and their parts beside V get a K-orthonormal basis Q. Correction j has
-    the energy p_j = |Qᵀ f_j|² in its span. Two more sums with random signs and the weights 1 / sqrt(p_j) have outside Q
-    the mean energy sum_j r_j / p_j, where r_j is the energy that correction j lacks. The bound (1) contains this sum
-    times p_j. If the sum is too large, G is applied to every load.
+(5) Corrections by fewer solutions. All corrections are the parts beside V of G F, with one load f_j of F for each, also
+    for inertia loads. Sets of constraint modes and eigenmodes have corrections that span no more than n_h columns:
+    K_II⁻¹ M Psi_C. So G is applied to n_h random sums of the loads [2]_, and their parts beside V get a K-orthonormal
+    basis Q. Correction j has the energy p_j = |Qᵀ f_j|² in its span. Two more sums with random signs and the weights
+    1 / sqrt(w_j) have outside Q the mean energy sum_j r_j / w_j, where r_j is the energy that correction j lacks, and
+    w_j < p_j its energy in the span of (3). The bound (1) contains this sum times w_j. If the sum is too large, G is
+    applied to every load. All columns are solved together.
 (6) Modes beside V that are close to the cutoff of the set are in no correction. `largest_errors` says how large the
-    errors of (2) may be with them.
+    errors of (2) may be with them. The guards raise this cutoff, and shapes below it are in the span.
 
 References
 ----------
@@ -38,6 +40,7 @@ References
 
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -53,18 +56,18 @@ from cms.modes.families.static_modes import ROUNDING_ENERGY
 from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.free_basis import FreeBasis
 from cms.reduction.frequency_bracket import largest_errors
-from cms.reduction.left_out_modes import left_out_modes, orthonormal
+from cms.reduction.left_out_modes import MotionLoads, left_out_modes, orthonormal
 from cms.reduction.mesh_error import mesh_errors
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.tall.columns import combine, dots, gram, inner, subtract
+from fe_models.foundation.tall.columns import combine, copied, dots, gram, inner, subtract
 
 __all__ = ["FrequencyErrors", "cutoff_of", "energy_error", "error_estimates", "frequency_errors", "require_one_process"]
 
 JUDGED = 30  #: number of judged modes of a set without vibration modes, which has no cutoff
 RANDOM, SEED = 6, 20  #: number of random columns of (3), and their seed
 TESTS, MISSING = 2, 0.01  #: number of tests of (5), and the sum of relative energies that corrections may lack
-SMALL = 1e-4  #: size of a correction relative to its mode, below which p_j in (5) is that of this size
+SMALL = 1e-4  #: size of a correction relative to its mode, below which w_j in (5) is that of this size
 FREQUENCY_ROUNDING = 1e-10  #: estimated error of a frequency, below which it is rounding
 EXACT_BOUND = FREQUENCY_ROUNDING**0.5  #: bound b of a mode whose error of frequency is rounding
 EXACT = 1e-7  #: bound b, below which a mode is exact within rounding
@@ -78,7 +81,8 @@ DAMPING = 0.01  #: damping ratio of every mode in compared frequency responses
 LOWEST = 0.05  #: lowest frequency of a response divided by the first elastic one; below it the body moves rigidly
 POINTS = 33  #: number of frequencies around each mode at which responses are compared
 METHOD = (
-    "frequency, shape, response: estimates by the Rayleigh-Ritz method with one step of inverse iteration; bound: "
+    "frequency, shape, response: estimates by the Rayleigh-Ritz method with one step of inverse iteration and guard "
+    "modes of the eigensolver; bound: "
     "from the residual, a small part of which random tests measure in large sets; static responses: computed, not "
     "estimated"
 )
@@ -96,14 +100,14 @@ class FrequencyErrors:
 
 @dataclass(frozen=True, eq=False)
 class EnlargedSpace:
-    """The span of a mode set, its corrections and some random columns, with shapes from the Rayleigh-Ritz method."""
+    """The span of a mode set, its corrections and guard modes, with shapes from the Rayleigh-Ritz method."""
 
     bound: Array  #: b of the judged modes, (n,)
     mu: Array  #: 1 / omega² of the new shapes, descending, (n_W,)
     Y: Array  #: part of each shape of V, scaled to unit strain energy, in each new shape, (n_V, n_W)
     motion: Array  #: motion in the directions of the loads in the new shapes of unit strain energy, (n_loads, n_W)
     masses: tuple[Array, Array, Array]  #: mu of V, its coupling with X, and the mass of X; see `largest_errors`
-    X: DisplacementColumns  #: corrections, residual responses and random columns, K-orthogonal to V, (n_dof, n_X)
+    X: DisplacementColumns  #: corrections, residual responses and guard modes, K-orthogonal to V, (n_dof, n_X)
     inertia: Array  #: error of the set for each inertia load; see `ErrorEstimates`, (n_r,)
 
 
@@ -141,18 +145,19 @@ def error_estimates(
         n = int((2 * np.pi * frequencies <= (1 + EXACT) * cutoff).sum())
     n = min(max(n, 1), len(frequencies))
     mesh = mesh_errors(families.body, basis, n)
-    loads, interface = interface_errors(families, basis)
+    names, interface = interface_errors(families, basis)
     interface = four_digits(interface, STATIC_ROUNDING)
-    directions = response_loads(families.body)
+    motion = None if families.body.is_held else MotionLoads.of_model(families.body, frame)
+    loads = static_loads(families, motion)
     has_statics = not np.nan_to_num(interface).any()
-    space = enlarged_space(families, basis, n, directions, inertia_loads(families), has_statics=has_statics)
-    errors = errors_of_modes(basis, space, cutoff)
+    space = enlarged_space(families, basis, n, loads, guards_of(modes), has_statics=has_statics)
+    errors = errors_of_modes(basis, space, complete_to(modes))
     return ErrorEstimates(
         four_digits(errors.frequency, FREQUENCY_ROUNDING),
         four_digits(errors.bound),
         four_digits(errors.shape),
-        four_digits(response_errors(basis, n, directions, space.motion, space.mu), RESPONSE_ROUNDING),
-        loads,
+        four_digits(response_errors(basis, n, loads.directions, space.motion, space.mu), RESPONSE_ROUNDING),
+        names,
         interface,
         four_digits(space.inertia, STATIC_ROUNDING),
         METHOD,
@@ -161,14 +166,15 @@ def error_estimates(
         mesh_sign=mesh.sign,
         mesh_method=mesh.method,
         largest=four_digits(errors.largest, FREQUENCY_ROUNDING),
-        left_out=left_out_modes(families, basis, space.X, Phi, frame),
+        left_out=None if motion is None else left_out_modes(basis, space.X, Phi, motion),
     )
 
 
-def frequency_errors(families: Families, basis: FreeBasis, n: int, cutoff: float | None = None) -> FrequencyErrors:
-    """Estimate the errors of the lowest n free frequencies and shapes; `cutoff` is that of the set, if it has one."""
+def frequency_errors(families: Families, basis: FreeBasis, n: int, modes: ModeSet | None = None) -> FrequencyErrors:
+    """Estimate the errors of the lowest n free frequencies and shapes; `modes`: the set, for its cutoff and guards."""
     none = np.zeros((families.body.n_dof, 0))
-    return errors_of_modes(basis, enlarged_space(families, basis, n, none, none), cutoff)
+    guards, cutoff = (None, None) if modes is None else (guards_of(modes), complete_to(modes))
+    return errors_of_modes(basis, enlarged_space(families, basis, n, StaticLoads(none, none, none), guards), cutoff)
 
 
 def cutoff_of(modes: ModeSet) -> float | None:
@@ -177,41 +183,65 @@ def cutoff_of(modes: ModeSet) -> float | None:
     return 2 * np.pi * float(vibrating.max()) if len(vibrating) else None
 
 
+def complete_to(modes: ModeSet) -> float | None:
+    """Return the angular frequency below which the vibration modes and guards of a set are complete; None: no modes."""
+    cutoff, resolved = cutoff_of(modes), 0.0 if modes.guards is None else 2 * np.pi * modes.guards.resolved_to
+    return None if cutoff is None else max(cutoff, resolved)
+
+
+def guards_of(modes: ModeSet) -> Array | None:
+    """Return the guard modes of a set, (n_dof, n_guards); None if it has none."""
+    return None if modes.guards is None or not modes.guards.Phi.shape[1] else modes.guards.Phi
+
+
+@dataclass(frozen=True, eq=False)
+class StaticLoads:
+    """Loads whose static responses belong to the enlarged space."""
+
+    directions: Array  #: loads of the responses, `response_loads`, (n_dof, n_loads)
+    inertia: Array  #: `inertia_loads`, (n_dof, n_r)
+    motion: Array  #: other loads of a motion: spin, load cases, (n_dof, k)
+
+
 def enlarged_space(
-    families: Families, basis: FreeBasis, n: int, directions: Array, inertia: Array, *, has_statics: bool = False
+    families: Families,
+    basis: FreeBasis,
+    n: int,
+    loads: StaticLoads,
+    guards: Array | None,
+    *,
+    has_statics: bool = False,
 ) -> EnlargedSpace:
-    """Add the corrections of the lowest n modes and of the responses to loads, and random columns, to the set.
+    """Add the corrections of the lowest n modes and of the responses to loads, and guard modes, to the set.
 
     Parameters
     ----------
-    directions, inertia
-        Loads of the responses, (n_dof, n_loads), and `inertia_loads`, (n_dof, n_r).
+    guards
+        Approximate modes above those of the set, (n_dof, n_guards); None: random columns take their place.
     has_statics
         Whether the set contains the static responses to loads at the interfaces that reactions balance. Those that
         inertia balances then lie in the span of the set and the responses to inertia loads.
     """
-    loads = correction_loads(families, basis, n, directions, has_statics=has_statics)
-    V, M, size = basis.Phi, loads.products.M, loads.size
-    noise = M @ np.random.default_rng(SEED).standard_normal((families.body.n_dof, RANDOM))  # (3)
-    sums, random = weights_of_sums(size, len(families.h)), np.random.default_rng(SEED + 2)
-    (X, smooth, statics), beside, whole = parts_beside(families, loads, loads.sums(sums), noise, inertia)  # (5)
-    energy, T = energy_inside(loads, X)
-    p = np.maximum(energy, (SMALL * size) ** 2)
-    signs = random.choice([-1.0, 1.0], (len(p), TESTS if sums.shape[1] < len(p) else 0))
-    noise = M @ (smooth.X - combine(V, inner(V, smooth.MX)))
-    (tests, smoother), *_ = parts_beside(families, loads, loads.sums(signs / np.sqrt(p)[:, None]), noise)
+    corrections = correction_loads(families, basis, n, loads, has_statics=has_statics)
+    near = beside_guards(families, corrections, guards)  # (3)
+    weights, _ = energy_inside(corrections, near, SMALL)
+    sums = weights_of_sums(corrections.size, len(families.h))
+    n_tests = TESTS if sums.shape[1] < len(weights) else 0
+    signs = np.random.default_rng(SEED + 2).choice([-1.0, 1.0], (len(weights), n_tests))
+    F = corrections.sums(np.hstack([sums, signs / np.sqrt(weights)[:, None]]))  # (5)
+    found = parts_beside(families, corrections, np.hstack([F, loads.motion]))
+    X, tests = found[: sums.shape[1]], found[sums.shape[1] : F.shape[1]]
+    energy, T = energy_inside(corrections, X, EXACT)
     outside = dots(tests.X, tests.KX).sum() - ((inner(tests.KX, X.X) @ T) ** 2).sum()
     lacking = max(outside, 0.0) / TESTS
     if lacking > MISSING:
-        (X,), *_ = parts_beside(families, loads, loads.sums(np.eye(len(p))))
-        energy, lacking = energy_inside(loads, X)[0], 0.0
-    bound = np.sqrt((energy + lacking * p)[:n] / basis.omega2[:n])  # (1)
-    of_inertia = slice(len(whole) - inertia.shape[1], None)
-    errors = inertia_errors(beside[of_inertia], whole[of_inertia])
-    is_column = beside[of_inertia] > EXACT**2 * whole[of_inertia]
-    statics = statics[np.flatnonzero(errors[is_column] > STATIC_ROUNDING)]
-    X = X.beside(tests).beside(statics).beside(smooth).beside(smoother)
-    return EnlargedSpace(bound, *ritz_shapes(basis, X, directions), X, errors)
+        X = parts_beside(families, corrections, corrections.sums(np.eye(len(weights))))
+        energy, lacking = energy_inside(corrections, X, EXACT)[0], 0.0
+    bound = np.sqrt((energy + lacking * weights)[:n] / basis.omega2[:n])  # (1)
+    X = X.beside(found[sums.shape[1] :], near)
+    of_inertia = slice(len(weights) - loads.inertia.shape[1], None)
+    errors = inertia_errors(energy[of_inertia], (energy + corrections.energy_in_V)[of_inertia])
+    return EnlargedSpace(bound, *ritz_shapes(basis, X, loads.directions), X, errors)
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,43 +250,48 @@ class CorrectionLoads:
 
     basis: FreeBasis  #: V
     products: Products
-    directions: Array  #: L, (n_dof, n_loads)
-    C: Array  #: coefficients, (n_V + n_loads, n_F)
+    L: Array  #: loads of responses and inertia loads, (n_dof, n_L)
+    C: Array  #: coefficients, (n_V + n_L, n_F)
+
+    @cached_property
+    def energy_in_V(self) -> Array:
+        """Energy of the part of each response in V, (n_F,)."""
+        mass = np.diag(self.basis.is_massive.astype(float))
+        V_F = np.hstack([mass, inner(self.basis.Phi, self.L)]) @ self.C
+        return np.asarray((V_F**2 / self.basis.omega2[:, None]).sum(axis=0))
 
     @property
     def size(self) -> Array:
         """Root of the energy of the part of each response in V, (n_F,); the largest one in place of zero."""
-        mass = np.diag(self.basis.is_massive.astype(float))
-        V_F = np.hstack([mass, inner(self.basis.Phi, self.directions)]) @ self.C
-        size = np.sqrt((V_F**2 / self.basis.omega2[:, None]).sum(axis=0))
+        size = np.sqrt(self.energy_in_V)
         return np.where(size > 0, size, size.max(initial=0.0))
 
     def sums(self, S: Array) -> Array:
         """Return F S, (n_dof, k)."""
-        of_modes, of_directions = np.split(self.C @ S, [len(self.basis.omega2)])
+        of_modes, of_loads = np.split(self.C @ S, [len(self.basis.omega2)])
         F = self.products.M @ combine(self.basis.Phi, of_modes)
-        subtract(F, self.directions, -of_directions)
+        subtract(F, self.L, -of_loads)
         return F
 
     def work(self, X: DisplacementColumns) -> Array:
         """Return Xᵀ F, (k, n_F)."""
-        return np.hstack([inner(X.MX, self.basis.Phi), inner(X.X, self.directions)]) @ self.C
+        return np.hstack([inner(X.MX, self.basis.Phi), inner(X.X, self.L)]) @ self.C
 
 
 def correction_loads(
-    families: Families, basis: FreeBasis, n: int, directions: Array, *, has_statics: bool
+    families: Families, basis: FreeBasis, n: int, loads: StaticLoads, *, has_statics: bool
 ) -> CorrectionLoads:
-    """Return the loads theta M phi of the lowest n modes, and those of the responses by (4)."""
-    n_V, n_loads = len(basis.omega2), directions.shape[1]
+    """Return the loads theta M phi of the lowest n modes, those of the responses by (4), and the inertia loads."""
+    L, n_V, n_loads = np.hstack([loads.directions, loads.inertia]), len(basis.omega2), loads.directions.shape[1]
     above = np.arange(n, n_V)[basis.is_massive[n:]]
-    share = np.zeros((n_V + n_loads, n_loads))
-    share[above] = inner(basis.Phi[:, above], directions) / basis.omega2[above, None]
-    C = [np.eye(n_V + n_loads, n) * basis.omega2[:n]]
+    unit = np.eye(n_V + L.shape[1])
+    C = [unit[:, :n] * basis.omega2[:n]]
     if not has_statics:
-        C.append(np.eye(n_V + n_loads)[:, n_V:])
+        C.append(unit[:, n_V : n_V + n_loads])
     if len(above):
-        C.append(share)
-    return CorrectionLoads(basis, Products.of_body(families.body), directions, np.hstack(C))
+        C.append(unit[:, above] @ (inner(basis.Phi[:, above], loads.directions) / basis.omega2[above, None]))
+    C.append(unit[:, n_V + n_loads :])
+    return CorrectionLoads(basis, Products.of_body(families.body), L, np.hstack(C))
 
 
 def weights_of_sums(size: Array, n_sums: int) -> Array:
@@ -272,36 +307,52 @@ def weights_of_sums(size: Array, n_sums: int) -> Array:
     return np.asarray(np.random.default_rng(SEED + 1).standard_normal((len(size), n_sums)) / size[:, None])
 
 
-def parts_beside(
-    families: Families, loads: CorrectionLoads, *blocks: Array
-) -> tuple[list[DisplacementColumns], Array, Array]:
-    """Return the elastic responses to blocks of loads without their parts in V.
-
-    Returns
-    -------
-    parts
-        One block of columns, K-orthogonal to V, for each block of loads. Responses in V are left out.
-    beside, whole
-        Energy of the part beside V and of the whole of each response, (k,).
-    """
-    V, omega2, products = loads.basis.Phi, loads.basis.omega2[:, None], loads.products
-    F = np.hstack(blocks)
+def parts_beside(families: Families, corrections: CorrectionLoads, F: Array) -> DisplacementColumns:
+    """Return the elastic responses to loads without their parts in V, (n_dof, k); zero if they are in V."""
+    if not F.shape[1]:
+        return corrections.products.beside(F)
     U = families.flexibility(F)
     whole = dots(U, F)
-    subtract(U, V, inner(V, F) / omega2)
+    subtract(U, corrections.basis.Phi, inner(corrections.basis.Phi, F) / corrections.basis.omega2[:, None])
+    return without_rounding(corrections, U, whole)
+
+
+def beside_guards(families: Families, corrections: CorrectionLoads, guards: Array | None) -> DisplacementColumns:
+    """Return the parts of guard modes beside V, (n_dof, n_guards), or random columns after two inverse iterations."""
+    V, products, free = corrections.basis.Phi, corrections.products, families.free
+    if guards is None:
+        noise = np.random.default_rng(SEED).standard_normal((len(V), RANDOM))
+        rough = parts_beside(families, corrections, products.M @ noise)
+        smooth = parts_beside(families, corrections, products.M @ (rough.X - combine(V, inner(V, rough.MX))))
+        return rough.beside(smooth)
+    U = copied(guards)
+    subtract(U, free.N, inner(free.M_N, U))
     K_U = products.K @ U
-    subtract(U, V, inner(V, K_U) / omega2)  # rounding
-    M_U, beside = products.M @ U, dots(U, K_U)
-    of_block = np.repeat(np.arange(len(blocks)), [each.shape[1] for each in blocks])
-    kept = [np.flatnonzero((of_block == k) & (beside > EXACT**2 * whole)) for k in range(len(blocks))]
-    parts = [DisplacementColumns(U[:, k], K_U[:, k], M_U[:, k], np.zeros((0, len(k)))) for k in kept]
-    return parts, beside, whole
+    whole = dots(U, K_U)
+    subtract(U, V, inner(V, K_U) / corrections.basis.omega2[:, None])
+    return without_rounding(corrections, U, whole)
 
 
-def energy_inside(loads: CorrectionLoads, X: DisplacementColumns) -> tuple[Array, Array]:
-    """Return the energy of each correction in the span of X, at least that of rounding, and T of `orthonormal`."""
+def without_rounding(corrections: CorrectionLoads, U: Array, whole: Array) -> DisplacementColumns:
+    """Subtract the rounding of columns in V, and set columns to zero that are rounding of their whole energy, (k,)."""
+    V, products = corrections.basis, corrections.products
+    K_U = products.K @ U
+    subtract(U, V.Phi, inner(V.Phi, K_U) / V.omega2[:, None])
+    found = DisplacementColumns(U, K_U, products.M @ U, np.zeros((0, U.shape[1])))
+    is_rounding = dots(U, K_U) <= EXACT**2 * whole
+    for each in (found.X, found.KX, found.MX) if is_rounding.any() else ():
+        each[:, is_rounding] = 0.0
+    return found
+
+
+def energy_inside(corrections: CorrectionLoads, X: DisplacementColumns, least: float) -> tuple[Array, Array]:
+    """Return the energy of each correction in the span of X, and T of `orthonormal`.
+
+    `least` is the size of a correction relative to its response in V, below which it gets the energy of this size.
+    """
     T = orthonormal(X)
-    return np.maximum(((T.T @ loads.work(X)) ** 2).sum(axis=0), (EXACT * loads.size) ** 2), T
+    energy = ((T.T @ corrections.work(X)) ** 2).sum(axis=0)
+    return np.maximum(energy, (least * corrections.size) ** 2), T
 
 
 def errors_of_modes(basis: FreeBasis, space: EnlargedSpace, cutoff: float | None) -> FrequencyErrors:
@@ -427,6 +478,14 @@ def interface_errors(families: Families, basis: FreeBasis) -> tuple[tuple[str, .
     z = np.zeros((len(families.h), len(names)))
     z[free.e] = free.solve_boundary(loads)
     return names, energy_error(families.body, basis, combine(families.Psi_C, z))
+
+
+def static_loads(families: Families, motion: MotionLoads | None) -> StaticLoads:
+    """Return the loads whose static responses belong to the enlarged space."""
+    none = np.zeros((families.body.n_dof, 0))
+    return StaticLoads(
+        response_loads(families.body), inertia_loads(families), none if motion is None else motion.beside_interfaces
+    )
 
 
 def inertia_loads(families: Families) -> Array:

@@ -21,7 +21,7 @@ from cms.modes.families.families import Families, families_of
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets import MODE_SETS
 from cms.reduction.basis.free_basis import FreeBasis, free_basis
-from cms.reduction.error_estimates import DAMPING, LOWEST, cutoff_of, frequency_errors
+from cms.reduction.error_estimates import DAMPING, LOWEST, frequency_errors
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.presentation import presented
@@ -290,7 +290,7 @@ def _by_estimate(make: _Maker, band: tuple[float, float], error: float) -> Itera
         n_columns, found = len(modes.labels), basis.frequencies(time)
         if len(found) < n_band:
             return Trial(n, n_columns, np.inf, f"has {len(found)} elastic modes, the band holds mode {n_band}")
-        judged = frequency_errors(families, basis, n_band, cutoff_of(modes))
+        judged = frequency_errors(families, basis, n_band, modes)
         if found[n_band - 1] / (1 + judged.frequency[-1]) > (1 + error) * band[1]:
             return Trial(n, n_columns, np.inf, f"lacks one of the {n_band} elastic modes of the band")
         uncertain, errors = np.flatnonzero(are_uncertain(judged.frequency, judged.largest)), SAFETY * judged.frequency

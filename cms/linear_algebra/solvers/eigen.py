@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from cms.errors import EigenError
 from cms.linear_algebra.solvers.factorization import Factorization, Matrix, factorize, matrix_of, shifted_matrix
 from cms.linear_algebra.solvers.inverse import Inverse
 from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
-from cms.linear_algebra.solvers.mode_search import DenseSearch, KrylovSearch
+from cms.linear_algebra.solvers.mode_search import GUARDS, DenseSearch, KrylovSearch
 from cms.linear_algebra.solvers.shift_inverted import ArraySpace, Modes, ShiftInverted
 from cms.linear_algebra.solvers.slepc_modes import SlepcSearch, search_on_ranks
 from fe_models.foundation.arrays import Array, IntArray
@@ -24,7 +24,7 @@ from fe_models.foundation.tall.columns import combine, elsewhere, in_memory, of_
 from fe_models.foundation.tall.on_disk import row_slices
 from fe_models.foundation.threads import one_blas_thread
 
-__all__ = ["EigenResult", "FactorMismatchError", "eigenmodes", "no_modes", "orientation", "turn_in_place"]
+__all__ = ["EigenResult", "FactorMismatchError", "GuardModes", "eigenmodes", "no_modes", "orientation", "turn_in_place"]
 
 
 SMALL = 300  #: number of dofs up to which dense matrices are faster
@@ -36,10 +36,26 @@ TIGHTEST, LOOSEST = 1e-13, 0.1  #: smallest tolerance that rounding allows, and 
 MISMATCH = 1e-3  #: relative residual of K x = omega² M x, above which the factor is not that of K - sigma M
 MOST_PROOFS = 3
 GAP = 1e-4  #: relative gap between two values of omega² that is sufficient for counting modes
+RESOLVED = 0.01  #: residual of a guard mode, below which its frequency is resolved
 
 
 class FactorMismatchError(EigenError):
     """The modes from a factorisation are not those of K and M."""
+
+
+@dataclass(frozen=True, eq=False)
+class GuardModes:
+    """Approximate modes just above the wanted ones, which the eigensolver found beside them."""
+
+    Phi: Array  #: mode shapes, M-orthonormal, (n_dof, n_guards)
+    frequencies: Array  #: frequencies of their Rayleigh quotients, ascending, (n_guards,) [Hz]
+    residuals: Array  #: as in `EigenResult`, (n_guards,)
+
+    @property
+    def resolved_to(self) -> float:
+        """Frequency below which wanted modes and guards are complete [Hz]; 0: no guard is resolved."""
+        n = int(np.logical_and.accumulate(self.residuals <= RESOLVED).sum())
+        return float(self.frequencies[n - 1] * (1 - RESOLVED)) if n else 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +72,26 @@ class EigenResult:
     n_solves: int  #: number of solved right-hand sides
     method: str  #: name and settings of the solver
     is_proven: bool  #: whether the inertia of a second factorisation confirmed that no mode is missing
+    guards: GuardModes | None = None  #: approximate modes above these; None: not known, or distributed over ranks
+
+    def over(self, expanded: Callable[[Any], Any]) -> "EigenResult":
+        """Return the modes and guards over other dofs, by a function from columns to columns."""
+        guards = None if self.guards is None else replace(self.guards, Phi=expanded(self.guards.Phi))
+        return replace(self, Phi=expanded(self.Phi), guards=guards)
+
+    def first(self, k: int) -> "EigenResult":
+        """Return the lowest k modes; the next ones become guards."""
+        if k == len(self.omega2):
+            return self
+        beyond = slice(k, k + GUARDS)
+        return replace(
+            self,
+            omega2=self.omega2[:k],
+            frequencies=self.frequencies[:k],
+            Phi=self.Phi[:, :k],
+            residuals=self.residuals[:k],
+            guards=GuardModes(self.Phi[:, beyond], self.frequencies[beyond], self.residuals[beyond]),
+        )
 
 
 def no_modes(n_dof: int) -> EigenResult:
@@ -156,7 +192,7 @@ def eigenmodes(
         modes = search.modes(wanted)
         if wanted.verify:
             modes = _proven_modes(K, M, search, modes, wanted)
-        k = wanted.n if wanted.omega2 is None else int((modes.omega2[: modes.n_wanted] <= wanted.omega2).sum())
+        k = int((modes.omega2[: modes.n_wanted] <= wanted.omega2).sum()) if wanted.omega2 is not None else wanted.n or 0
         residuals, method = modes.residuals, search.description
         n_solves, solver = operator.n_solves, factorization.description
         # if K itself is factorised, there is no rigid-body mode, even if the highest omega² of the mesh is very large
@@ -174,12 +210,14 @@ def eigenmodes(
         stays = space is not None and space.has_rows_of(K)
         Phi = columns if stays else of_this_process(columns)
         del columns  # before the space is closed, because ranks then free data without references
-        Phi = combine(Phi, orientation(Phi, omega2)[:, :k], order="C")
+        Z, frequencies = orientation(Phi, omega2), np.sqrt(omega2) / (2 * np.pi)
+        guards = None if stays else GuardModes(combine(Phi, Z[:, k:]), frequencies[k:], residuals[k:])
+        Phi = combine(Phi, Z[:, :k], order="C")
     omega2 = omega2[:k]
     _require_match(K, M, Phi, omega2, shift, tolerance)
     method = f"{method}; shift {shift:.6g}, tolerance {tolerance:g}, {n_solves} columns solved by {solver}"
     return EigenResult(
-        omega2, np.sqrt(omega2) / (2 * np.pi), Phi, residuals[:k], n_solves, method, is_proven=wanted.verify
+        omega2, frequencies[:k], Phi, residuals[:k], n_solves, method, is_proven=wanted.verify, guards=guards
     )
 
 

@@ -199,7 +199,8 @@ class BlockLanczos:
 BLOCK = 8  #: number of columns in a Lanczos block; narrow blocks need fewer columns in total
 #: columns of a wide block, and number of modes from which it is used; wide blocks are solved faster per column
 WIDE, MANY = 16, 32
-GUARDS = 8  #: number of Ritz vectors beyond the wanted ones in the last step
+GUARDS = 16  #: number of Ritz vectors beyond the wanted ones in the last step
+SOLVED_GUARDS = 8  #: the same if the last step solves for each of them
 FIRST_GUESS = 30  #: assumed number of modes if only a cutoff frequency is given
 MOST_COLUMNS = 40  #: largest number of solved columns per wanted mode and guard mode
 MOST_REFINEMENTS = 4
@@ -233,10 +234,10 @@ class KrylovSearch:
                 residual, defect = measured_residual(operator, modes)
                 self._is_clean = defect <= max(VISIBLE, 100 * residual)
             if not self._is_clean:
-                n_kept = leading_count(ritz.theta, k, k + GUARDS)
+                n_kept = leading_count(ritz.theta, k, k + SOLVED_GUARDS)
                 X = combine(self._lanczos.V, ritz.S[:, :n_kept])
                 modes = refined_modes(operator, X, ritz.theta[:n_kept], k)
-                residual = modes.residuals.max(initial=0.0)
+                residual = modes.residuals[:k].max(initial=0.0)
             if residual <= operator.tolerance:
                 return modes
             tolerance = max(0.1 * tolerance, FLOOR)  # the residual from the recurrence can be smaller than the true one
@@ -310,7 +311,7 @@ def improved_modes(lanczos: BlockLanczos, ritz: RitzPairs, k: int, shift: float)
     return Modes(
         mu[: k + GUARDS] + shift,
         k,
-        ritz.residuals[:k],
+        ritz.residuals[: Z.shape[1]],
         lanczos.V_and_next,
         np.concatenate([ritz.S[:, :p] @ Z, g @ Z]),
     )
@@ -356,12 +357,12 @@ class DenseSearch:
         n_kept = leading_count(theta, k, min(k + GUARDS, n_finite))
         modes = refined_modes(operator, self._A_inv_B @ (self._Q[:, :n_kept] / theta[:n_kept]), theta[:n_kept], k)
         for _ in range(MOST_REFINEMENTS):
-            if modes.residuals.max(initial=0.0) <= operator.tolerance:
+            if modes.residuals[:k].max(initial=0.0) <= operator.tolerance:
                 break
             modes = refined_modes(operator, combine(modes.Y, modes.Z), 1 / (modes.omega2 - operator.shift), k)
-        if modes.residuals.max(initial=0.0) > operator.tolerance:
+        if modes.residuals[:k].max(initial=0.0) > operator.tolerance:
             raise EigenError(
-                f"eigenmodes: residuals are {modes.residuals.max():.1e}, expected {operator.tolerance:.1e}; "
+                f"eigenmodes: residuals are {modes.residuals[:k].max():.1e}, expected {operator.tolerance:.1e}; "
                 "allow a larger tolerance"
             )
         operator.report(k, wanted.n or 0)

@@ -115,7 +115,7 @@ class Modes:
 
     omega2: Array  #: squared angular frequencies, ascending, (n_wanted + n_guards,)
     n_wanted: int
-    residuals: Array  #: residuals of the wanted modes before the last improvement, (n_wanted,)
+    residuals: Array  #: residuals of all modes before the last improvement, (n_wanted + n_guards,)
     Y: Any  #: columns of the space that are combined, (n, p)
     Z: Array  #: coefficients of M-orthonormal modes Phi = Y Z, (p, n_wanted + n_guards)
 
@@ -133,7 +133,7 @@ def refined_modes(operator: ShiftInverted, X: Any, theta: Array, n_wanted: int) 
     H = inner(Y, M_X) / theta
     del M_X
     subtract(X, Y, np.eye(len(theta)))
-    residuals = np.sqrt(np.maximum(np.diag(inner(X, M @ X)), 0.0))[:n_wanted]
+    residuals = np.sqrt(np.maximum(np.diag(inner(X, M @ X)), 0.0))
     del X
     mu, Z = la.eigh((H + H.T) / 2, gram(Y, M @ Y))
     return Modes(mu + operator.shift, n_wanted, residuals, Y, Z)

@@ -182,7 +182,7 @@ class SlepcSearch:
         if len(omega2) < k:
             raise EigenError(f"eigenmodes: SLEPc found {len(omega2)} of {k} modes to {tolerance:.1e}")
         operator.report(k, wanted.n or 0)
-        return Modes(omega2, k, errors[:k], Phi, np.eye(len(omega2)))
+        return Modes(omega2, k, errors, Phi, np.eye(len(omega2)))
 
 
 def spread_mass(ranks: Ranks, key: str, rows: Rows) -> None:

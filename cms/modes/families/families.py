@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -285,23 +285,11 @@ class _Found:
         if wanted.verify and not self.modes.is_proven:
             return None
         if wanted.n is not None:
-            return _first(self.modes, wanted.n) if wanted.n <= len(frequencies) else None
+            return self.modes.first(wanted.n) if wanted.n <= len(frequencies) else None
         known = max(self.cutoff or 0.0, frequencies[-1] * (1 - 1e-9) if len(frequencies) else 0.0)
         if cutoff is None or cutoff > known:
             return None
-        return _first(self.modes, int((frequencies <= cutoff).sum()))
-
-
-def _first(modes: EigenResult, k: int) -> EigenResult:
-    if k == len(modes.omega2):
-        return modes
-    return replace(
-        modes,
-        omega2=modes.omega2[:k],
-        frequencies=modes.frequencies[:k],
-        Phi=modes.Phi[:, :k],
-        residuals=modes.residuals[:k],
-    )
+        return self.modes.first(int((frequencies <= cutoff).sum()))
 
 
 # A body, or in its place its `Families`, which several mode sets share to use one factorisation -----------------------

@@ -1,7 +1,7 @@
 """Body with all boundary dofs fixed: factorised interior stiffness, fixed-interface modes, stiffness condensed to B."""
 
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as la
@@ -93,7 +93,7 @@ def fixed_interface_modes(fixed: FixedInterfaceBody, wanted: ModeCount) -> Eigen
     blocks = PrincipalBlock(fixed.body.K, fixed.i), PrincipalBlock(fixed.body.M, fixed.i)
     numbering = np.searchsorted(np.sort(fixed.i), fixed.i)
     modes = eigenmodes(*blocks, wanted, factorization=fixed.factorization, numbering=numbering)
-    return replace(modes, Phi=blocks[0].expanded(modes.Phi))
+    return modes.over(blocks[0].expanded)
 
 
 def _mechanism_message(body: FEBody, i: IntArray, K_ii: sp.csc_array, M_ii: sp.csc_array, solver: Solver) -> str:

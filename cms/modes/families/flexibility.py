@@ -304,7 +304,7 @@ def elastic_modes(flexibility: Flexibility, wanted: ModeCount) -> EigenResult:
         raise _lost_in_rounding(flexibility) from error
     if wanted.verify:
         modes = _proven(flexibility, modes, wanted)
-    modes = replace(modes, Phi=flexibility.expand(modes.Phi))
+    modes = modes.over(flexibility.expand)
     if flexibility.conditions.K_load is not None:
         body, omega2 = flexibility.condensed.fixed.body, modes.omega2
         rounding = rounding_of_energy(body, modes.Phi)

@@ -68,6 +68,22 @@ def test_a_lattice_has_its_closed_form_frequencies(sizes, n_modes):
     assert_modes(K, M, eigenmodes(K, M, n_modes=n_modes, factorization=factorize(K)), omega2[:n_modes])
 
 
+@pytest.mark.parametrize(("sizes", "n_modes"), [((400,), 7), ((40, 31), 25), ((14, 12, 10), 40), ((10, 10, 10), 22)])
+def test_guard_modes_are_the_next_ones_as_far_as_they_are_resolved(sizes, n_modes):
+    K, M, omega2 = lattice(*sizes)
+    result = eigenmodes(K, M, n_modes=n_modes, factorization=factorize(K))
+    guards = result.guards
+    n_resolved = int((omega2 < (2 * np.pi * guards.resolved_to) ** 2).sum())
+    assert n_modes < n_resolved <= n_modes + len(guards.frequencies) == n_modes + guards.Phi.shape[1]
+    following = slice(0, n_resolved - n_modes)
+    assert_allclose(guards.frequencies[following], hertz(omega2[n_modes:n_resolved]), rtol=1e-4)
+    joined = np.hstack([result.Phi, guards.Phi])
+    assert_allclose(joined.T @ (M @ joined), np.eye(joined.shape[1]), rtol=0, atol=ROUNDOFF)
+    part = eigenmodes(K, M, n_modes=n_modes + 30, factorization=factorize(K)).first(n_modes)
+    assert_allclose(part.guards.frequencies, hertz(omega2[n_modes : n_modes + part.guards.Phi.shape[1]]), rtol=1e-9)
+    assert part.guards.resolved_to >= guards.resolved_to * (1 - 1e-3)
+
+
 @pytest.mark.parametrize("n_modes", [3, 11, 20, 33])
 def test_multiple_modes_are_found_completely(n_modes):
     """A cube: triple and sextuple modes; some of these counts cut through one."""
