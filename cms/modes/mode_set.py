@@ -29,6 +29,11 @@ __all__ = [
     "rigid_block", "vibration_block",
 ]  # fmt: skip
 
+VERIFIED = "yes: a second factorisation counted the modes, and none is missing"
+NOT_VERIFIED = (
+    "no: the modes were not counted; verify = true in [reduction] of the job counts them by one more factorisation"
+)
+
 
 @presented
 @dataclass(frozen=True, eq=False)
@@ -168,7 +173,7 @@ def mode_set(
     if modes is not None:
         recorded |= {"n_modes": str(len(modes.frequencies))}
         if len(modes.frequencies):
-            recorded |= {"verified": str(modes.is_proven), "eigensolver": modes.method}
+            recorded |= {"verified": VERIFIED if modes.is_proven else NOT_VERIFIED, "eigensolver": modes.method}
     if wanted is not None and wanted.cutoff is not None:
         recorded["cutoff"] = repr(float(wanted.cutoff))
     columns, layout = [block.columns for block in blocks], families.body.layout

@@ -123,7 +123,7 @@ def accept(
         records = (*records, left_out_record(left_out))
     if band is not None:
         records = (*records, band_record(reduced, records, band))
-    error = mesh_error(job, most_dofs, stages)
+    error = with_estimate_of_file(mesh_error(job, most_dofs, stages), reduced)
     if error.estimate is not None:
         records = (*records, judge("mesh-error", error.largest, error.words, {"error": error.estimate.error}))
     return Acceptance(
@@ -236,7 +236,7 @@ def mesh_error(job: Job | None, most_dofs: int, stages: Stages) -> MeshError:
         return MeshError("not estimated, as asked")
     try:
         if job.mesh_size is not None:
-            found = mesh_convergence(job, n_modes=6, stages=stages)
+            found = mesh_convergence(job, n_modes=LOWEST, stages=stages)
             return MeshError(
                 f"two sizes, {found.n_dof[0]} and {found.n_dof[1]} dofs: the lowest frequencies of the job's own lie "
                 f"too high by up to {100 * float(np.abs(found.error).max()):.2g} %",
@@ -262,6 +262,23 @@ def mesh_error(job: Job | None, most_dofs: int, stages: Stages) -> MeshError:
         f"{100 * float(refined.error.max()):.2g} %",
         refined,
     )
+
+
+LOWEST = 6  #: number of the lowest free frequencies whose error by the mesh is stated
+
+
+def with_estimate_of_file(error: MeshError, reduced: ReducedBody) -> MeshError:
+    """Add the estimates that the modal file has, from the stress of the modes, if no mesh was refined."""
+    of_modes = np.zeros(0) if reduced.errors is None else reduced.errors.mesh[:LOWEST]
+    if error.estimate is not None or reduced.errors is None or np.isnan(of_modes).all():
+        return error
+    largest = float(np.nanmax(of_modes))
+    too = "too high" if reduced.errors.mesh_sign == "+" else "too high or too low"
+    words = (
+        f"{error.words}; by the stress of the modes on this mesh, which the file has on record, the lowest "
+        f"{len(of_modes)} free frequencies lie {too} by up to {100 * largest:.2g} %"
+    )
+    return replace(error, words=words, of_file=largest)
 
 
 # A received body against a full model of the same part: mass, free frequencies, and shapes at nodes in common ---------

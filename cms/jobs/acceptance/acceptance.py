@@ -42,12 +42,13 @@ class MeshError:
     """Estimate of the error due to the mesh."""
 
     words: str  #: description of the estimate, or the reason why there is none
-    estimate: MeshConvergence | MeshRefinement | None = None
+    estimate: MeshConvergence | MeshRefinement | None = None  #: estimate by a refined mesh
+    of_file: float = float("nan")  #: largest estimate of the file for the lowest frequencies; NaN: none
 
     @property
     def largest(self) -> float:
         """Largest estimated relative error of the lowest frequencies; NaN if there is no estimate."""
-        return float("nan") if self.estimate is None else float(np.abs(self.estimate.error).max())
+        return self.of_file if self.estimate is None else float(np.abs(self.estimate.error).max())
 
 
 @presented
@@ -116,7 +117,7 @@ class Acceptance:
 def mesh_record(error: MeshError) -> dict[str, Any]:
     """Return the estimate of the mesh error in plain types."""
     if error.estimate is None:
-        return {"largest": None}
+        return {"largest": plain(error.largest)}
     return {
         "largest": plain(error.largest),
         "n_dof": list(error.estimate.n_dof),

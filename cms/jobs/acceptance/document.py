@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cms.assessment.quality.body_record import body_record, body_size
+from cms.assessment.quality.body_record import body_record, body_size, in_hertz
 from cms.assessment.quality.errors import QualityError
 from cms.assessment.quality.of_body.effective_mass import DIRECTIONS, EffectiveMass
 from cms.assessment.rendering import Scene, Surface, Triad, render_picture
@@ -16,10 +16,12 @@ from cms.assessment.report.formatting import hertz
 from cms.assessment.report.parts import records_table
 from cms.assessment.report.png import png_of
 from cms.assessment.report.view import view_axes
+from cms.body.error_estimates import ErrorEstimates
 from cms.body.reduced_body import ReducedBody
 from cms.jobs.acceptance.acceptance import VERDICT_WORDS, Acceptance
 from cms.jobs.acceptance.origin import origin_groups
 from cms.jobs.acceptance.range_of_use import RangeOfUse
+from fe_models.foundation.arrays import Array
 from fe_models.foundation.documents.charts import Axis, Chart, Line
 from fe_models.foundation.documents.document import (
     Answer,
@@ -177,7 +179,31 @@ def modes_part(a: Acceptance) -> Section:
         blocks.append(
             TextTable(("mode>", "full model Hz>", "reduced Hz>", "error %>"), free, (0.1, 0.3, 0.3, 0.3), None, caption)
         )
+    if a.body.errors is not None and len(a.body.errors.frequency):
+        blocks.append(errors_table(a.body, a.body.errors))
     return Section("modes", "Modes", tuple(blocks))
+
+
+def errors_table(body: ReducedBody, errors: ErrorEstimates) -> TextTable:
+    """Return the errors of the free frequencies by the reduction and by the mesh that the file has on record."""
+
+    def percent(values: Array, k: int, sign: str) -> str:
+        return f"{sign}{100 * values[k]:.2g}" if k < len(values) and np.isfinite(values[k]) else ""
+
+    sign = "+" if errors.mesh_sign == "+" else "±"
+    frequencies = in_hertz(body, body.free_frequencies)
+    rows = tuple(
+        (str(k + 1), f"{frequencies[k]:.6g}", percent(errors.frequency, k, "+") + " ?" * bool(errors.is_uncertain[k]),
+         percent(errors.largest, k, ""), percent(errors.mesh, k, sign))
+        for k in range(min(len(errors.frequency), MOST_MODES))
+    )  # fmt: skip
+    caption = (
+        "Estimated errors of the free frequencies, from the modal file: by the reduction (?: uncertain), the most that "
+        "modes beyond the set can cause, and by the mesh"
+    )
+    headings = ("mode>", "Hz>", "reduction %>", "at most %>", "mesh %>")
+    shown = caption + more_words(len(errors.frequency))
+    return TextTable(headings, rows, (0.1, 0.24, 0.22, 0.22, 0.22), None, shown)
 
 
 def more_words(n: int) -> str:

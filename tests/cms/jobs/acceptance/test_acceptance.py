@@ -64,6 +64,21 @@ def test_own_body_against_its_job(accepted, folder):
     assert 0 < mesh.value == accepted.mesh_error.largest
 
 
+def test_a_body_whose_mesh_is_not_refined_has_the_mesh_errors_of_its_file(folder):
+    """And a body without them has none."""
+    body = read(folder / "bar.h5")
+    found, without = accept(body), accept(replace(body, errors=replace(body.errors, mesh=np.zeros(0), mesh_sign="")))
+    assert len(body.errors.mesh) > 0
+    assert found.mesh_error.largest == found.as_dict()["mesh_error"]["largest"] == body.errors.mesh[:6].max() > 0
+    assert f"by up to {100 * body.errors.mesh[:6].max():.2g} %" in found.mesh_error.words
+    assert np.isnan(without.mesh_error.largest)
+    assert without.as_dict()["mesh_error"]["largest"] is None
+    page = html_page(document_of(found))
+    assert "mesh error of the lowest frequencies, estimated" in page
+    for error in (body.errors.frequency[-1], body.errors.mesh[-1]):
+        assert f"+{100 * error:.2g}" in page
+
+
 def test_the_body_is_checked_once(folder, monkeypatch):
     """By itself, and beside the full model of its job."""
     asked = []
