@@ -20,8 +20,8 @@ from fe_models.foundation.stages import Stages
 
 __all__ = ["job_at", "reduce_family"]
 
-FEWEST_BEYOND = 4  #: modes beyond the cutoff of a sample, or half the number of its modes if that is more
-BEYOND_CUTOFF = 10  #: modes beyond a cutoff frequency
+FEWEST_BEYOND = 4  #: modes beyond the cutoff of a sample, or the number of its modes if that is more
+BEYOND_CUTOFF = 12  #: modes beyond a cutoff frequency
 
 
 def reduce_family(
@@ -33,7 +33,9 @@ def reduce_family(
 ) -> ParametricBody:
     """Reduce a job at every combination of values of its parameters, and estimate the error of interpolation.
 
-    A job with a parameter of two values only is reduced once more, in the middle, for the estimate.
+    A job with a parameter of two values only is reduced once more, in the middle, for the estimate. Samples also have
+    modes beyond the cutoff of the mode set (`beyond` in the table [reduction], by default as many as `n_modes`), and no
+    error estimates, which interpolated bodies do not have, unless the job requests them.
 
     Parameters
     ----------
@@ -78,7 +80,7 @@ def job_at(path: str | os.PathLike[str], point: Mapping[str, float]) -> Job:
     reduction = job.reduction
     if reduction.beyond is None:
         n = reduction.n_modes
-        n_beyond = max(FEWEST_BEYOND, n // 2) if isinstance(n, int) else BEYOND_CUTOFF
+        n_beyond = max(FEWEST_BEYOND, n) if isinstance(n, int) else BEYOND_CUTOFF
         reduction = reduction.model_copy(update={"beyond": n_beyond})
     if reduction.error_estimates is None:  # interpolated bodies have none
         reduction = reduction.model_copy(update={"error_estimates": False})

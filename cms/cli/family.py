@@ -32,9 +32,9 @@ def family_command(
 
     The file gives the reduced body at any values between them: cms interpolate.
 
-    The modes of all samples are aligned. The printed error is that of bodies interpolated at inner values without the
-    samples there; a parameter with two values costs one more reduction, in the middle. Without -o: rod.toml gives
-    rod_family.h5.
+    All samples get the same modes, also if modes cross the cutoff of the mode set. The printed error is that of bodies
+    interpolated at inner values without the samples there; a parameter with two values costs one more reduction, in the
+    middle. Without -o: rod.toml gives rod_family.h5.
 
     Example: cms family rod.toml --over length=1.0:1.2:3 -o rod_family.h5
 

@@ -101,8 +101,9 @@ class Change:
 
     def translations(self, Phi: Array, points: Array) -> Array:
         """Return translations of the new shapes, (n, 3, n_q), from those of the old ones at points in the old frame."""
-        off = Phi - rigid_motion_of_points(points, np.zeros(3)) @ self.C
-        return np.einsum("ba,nbk->nak", self.R, off @ self.Z)
+        off = Phi - rigid_motion_of_points(points, np.zeros(3)) @ self.C if self.C.any() else Phi
+        moved = (off.reshape(-1, off.shape[2]) @ self.Z).reshape(len(off), 3, -1)
+        return moved if np.array_equal(self.R, np.eye(3)) else np.einsum("ba,nbk->nak", self.R, moved)
 
     def points(self, positions: Array) -> Array:
         """Return positions in the new frame, (n, 3) [m]."""

@@ -26,8 +26,9 @@ import numpy as np
 from cms.body.reduced_body import BodyFrame, ReducedBody
 from cms.errors import BodyError
 from cms.reduction.basis.damping import modal_damping, stated_damping
-from cms.reduction.basis.frames import FRAMES, Axes, NodalFrame, TisserandFrame
+from cms.reduction.basis.frames import FRAMES, Axes, Frame, NodalFrame, TisserandFrame
 from cms.reduction.frame_conversion import Change, changed_body, convert_frame
+from cms.reduction.free_pencil import free_elastic_modes
 from fe_models.foundation.arrays import Array
 
 __all__ = ["AlignedSample", "align", "divisors", "in_frame", "in_mean_axes", "recombined", "rescaled"]
@@ -160,20 +161,20 @@ def in_mean_axes(sample: ReducedBody) -> ReducedBody:
 def in_frame(body: ReducedBody, frame: BodyFrame, provenance: dict[str, str]) -> ReducedBody:
     """Return a body of mean axes in another frame, with this provenance and the damping that it states.
 
-    The momentum of its modes, which interpolation leaves, is removed first, and gives the free frequencies. Rotated and
-    distributed loads of the geometric stiffness are left out: they follow from the moments, which interpolated ones do
-    not exactly.
+    Interpolation leaves a momentum of its modes, which the conversion removes. Rotated and distributed loads of the
+    geometric stiffness are left out: they follow from the moments, which interpolated ones do not exactly.
     """
     axes, origin, made = axes_of(frame), vector(frame.origin), body
     if not body.is_held:
-        made = convert_frame(body, TisserandFrame(axes=axes))
-        free = made.frequencies[: len(body.free_frequencies)]
-        if frame.kind == "nodal":
-            dofs = None if frame.at else tuple((int(node), int(component)) for node, component in frame.dofs)
-            made = convert_frame(made, NodalFrame(frame.at or None, origin, axes, dofs))
-        else:
-            made = convert_frame(made, FRAMES[frame.kind](origin=origin, axes=axes))
-        made = replace(made, free_frequencies=free)
+        free = np.sqrt(free_elastic_modes(body)[0][: len(body.free_frequencies)]) / (2 * np.pi)
+        to: Frame = (
+            NodalFrame(
+                frame.at or None, origin, axes, None if frame.at else tuple((int(k), int(c)) for k, c in frame.dofs)
+            )
+            if frame.kind == "nodal"
+            else FRAMES[frame.kind](origin=origin, axes=axes)
+        )
+        made = replace(convert_frame(body, to), free_frequencies=free)
     geometric = None if made.geometric is None else replace(made.geometric, turned=None, spread=None)
     made = replace(made, provenance=provenance, geometric=geometric)
     return replace(made, D=made.D + damping_of_modes(made))

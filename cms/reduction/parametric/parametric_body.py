@@ -22,7 +22,7 @@ References
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import product
 from typing import Any
@@ -71,6 +71,10 @@ SAME_REDUCTION = {
 }
 OF_MODES = ("mode set columns",)  #: of these, what differs with the number of modes
 
+#: fields of an interpolated body that are those of the nearest sample, or replaced
+OF_NEAREST = (
+    "M", "K", "labels", "sources", "energy_shares", "free_frequencies", "provenance", "columns", "errors",
+)  # fmt: skip
 SAME_MODES = "Give n_modes a number instead of a cutoff or an error, and the same to all samples"
 SAME_MESH = "A parameter may move nodes, but not change their number: scale one mesh instead of meshing anew"
 #: numbers of things that must agree among the samples
@@ -390,12 +394,18 @@ def without_large_arrays(body: ReducedBody) -> ReducedBody:
 def interpolated(aligned: Sequence[AlignedSample], weights: Weights, near: int, names: Sequence[str]) -> ReducedBody:
     """Return the interpolated body with new modes in the frame of the aligned samples, steps (4) to (6)."""
     own = aligned[near].body
-    shared: dict[str, Any] = {
-        "M": own.M, "K": own.K, "labels": own.labels, "sources": own.sources, "energy_shares": own.energy_shares,
-        "free_frequencies": own.free_frequencies, "provenance": own.provenance, "columns": None, "errors": None,
-    }  # fmt: skip
-    alike = [replace(each.body, **shared) for each in aligned]
-    mixed = blended(alike, weights.entries, "body", names)  # (5)
+    mixed = replace(
+        own,
+        columns=None,
+        errors=None,
+        **{
+            field.name: blended(
+                [getattr(each.body, field.name) for each in aligned], weights.entries, f"body.{field.name}", names
+            )
+            for field in fields(own)
+            if field.name not in OF_NEAREST
+        },
+    )  # (5)
     radii = np.array([each.radii for each in aligned])
     mean = np.where((radii > 0).all(axis=0), np.exp(weights.logarithms @ np.log(divisors(radii))), 0.0)
     mixed = with_rigid_members(rescaled(mixed, 1 / divisors(mean), 1 / float(np.linalg.norm(mean))))
