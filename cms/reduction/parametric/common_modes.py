@@ -34,6 +34,7 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["has_modes_beyond", "in_common_modes"]
 
+NO_SHARE = 1e-6  #: largest share of a column in the energy of a mode, below which it is a rigid-body motion
 OUTSIDE = 0.3  #: sine of the angle to the common space, above which a direction of a sample is added to it
 
 
@@ -98,9 +99,10 @@ class SplitModes:
 def split_modes(sample: ReducedBody, name: str) -> SplitModes:
     """Return B and E of step (1) from the source columns of a sample.
 
-    Column c is the combination F_ck / omega_k² of the modes, because F_ck is its work with the force K phi_k. The rank
-    of the set is known: independent columns beyond the cutoff are missing. In the norm K + omega_1² M, stiff static
-    columns and soft modes have similar size.
+    Column c is the combination z_ck = F_ck / omega_k² of the modes, because F_ck is its work with the force K phi_k. An
+    independent column has Σ_k A_ck z_ck = 1, and so a share in the energy of some mode; rigid-body motions and
+    redundant columns have none but rounding. The rank of the set is known: columns beyond the cutoff are missing. In
+    the norm K + omega_1² M, stiff static columns and soft modes have similar size.
     """
     mean, of_frame = sample, np.eye(sample.n_q)
     if not sample.is_held:
@@ -109,11 +111,11 @@ def split_modes(sample: ReducedBody, name: str) -> SplitModes:
     assert mean.columns is not None
     omega2 = np.diag(mean.K)
     is_beyond = np.array([group == BEYOND for group in mean.columns.groups])
-    is_kept = np.linalg.norm(mean.columns.A, axis=1) > 0  # redundant columns have no part in any mode
+    is_elastic = mean.columns.shares().max(axis=0) > NO_SHARE
     norm = np.sqrt(omega2 + omega2[0])
-    Y = norm[:, None] * (mean.columns.F[~is_beyond & is_kept] / omega2).T
-    Y = Y[:, (sizes := np.linalg.norm(Y, axis=0)) > 0] / sizes[sizes > 0]
-    n = mean.n_q - int(np.count_nonzero(is_beyond & is_kept))
+    Y = norm[:, None] * (mean.columns.F[~is_beyond & is_elastic] / omega2).T
+    Y /= np.linalg.norm(Y, axis=0)
+    n = mean.n_q - int(np.count_nonzero(is_beyond & is_elastic))
     span = la.qr(Y, mode="economic", pivoting=True)[0][:, :n]
     basis = la.qr(span / norm[:, None])[0]
     left, sizes, right = rows_of_shapes(name, mean)

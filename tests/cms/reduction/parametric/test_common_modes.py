@@ -162,3 +162,16 @@ def test_a_family_with_crossings_at_the_cutoff_is_as_good_as_its_estimate(job, f
 @pytest.fixture(scope="module")
 def family(job):
     return reduce_family(job, {"thickness": THICKNESSES})
+
+
+@pytest.mark.parametrize("chosen", ['set = "rubin"\nn_modes = 5', 'set = "craig-bampton"\ncutoff = 700.0'])
+def test_static_responses_of_samples_stay_those_of_the_set(job, chosen):
+    """Rubin's residual modes depend on the number of modes; below a cutoff the samples have 7, 7 and 6 modes."""
+    path = job.with_name("other.toml")
+    path.write_text(JOB.replace('set = "craig-bampton-ir"\nn_modes = 5', chosen))
+    family = reduce_family(path, {"thickness": THICKNESSES})
+    sets = [reduced(path, thickness) for thickness in THICKNESSES]
+    assert {sample.n_q for sample in family.samples} == {max(each.n_q for each in sets) + ("rubin" in chosen)}
+    for sample, own in zip(family.samples, sets, strict=True):
+        assert (sample.frequencies[: own.n_q] <= own.frequencies * (1 + 1e-9)).all()
+        assert relative(flexibility(sample), flexibility(own)) < 1e-9
