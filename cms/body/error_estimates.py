@@ -52,7 +52,7 @@ class ErrorEstimates:
         Estimate of the relative error of each frequency of the finite element model by its mesh, (n_judged,); NaN: not
         known, 10: 10 or more. Empty: not estimated.
     mesh_sign
-        "+": these frequencies are too high; "+-": too high or too low.
+        "+": these frequencies are too high; "+-": too high or too low; "signed": too high where `mesh` is positive.
     mesh_method
         How `mesh` was estimated, or why it is not known.
     largest

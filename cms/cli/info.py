@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 __all__ = ["info_command", "info_record", "print_body"]
 
 ROUNDING = 1e-9  #: relative error, below which the output says "exact"
-MESH_SIGNS = {"+": "+", "+-": "±"}
+MESH_SIGNS = {"+": "+", "+-": "±", "signed": "+"}
 MOST_SETS = 20  #: largest number of sets in the output
 
 
@@ -184,10 +184,13 @@ def print_free_frequencies(record: Any) -> None:
 
 
 def error_percent(value: float | None, sign: str = "") -> str:
-    """Return a relative error in percent with two digits; "exact" if it is rounding, "" if it is not known."""
+    """Return a relative error in percent with two digits; "exact" if it is rounding, "" if it is not known.
+
+    A negative error has its own sign.
+    """
     if value is None:
         return ""
-    return "exact" if value < ROUNDING else f"{sign}{100 * value:.2g} %"
+    return "exact" if abs(value) < ROUNDING else f"{sign if value > 0 else ''}{100 * value:.2g} %"
 
 
 def stiffening_words(record: Any) -> str:

@@ -459,7 +459,7 @@ def receptance_error(omega: Array, reduced: tuple[Array, Array], better: tuple[A
 
 def four_digits(errors: Array, rounding: float = 0.0) -> Array:
     """Return errors with four digits, zero below `rounding`; further digits depend on the number of threads."""
-    return np.array([0.0 if error < rounding else float(f"{error:.4g}") for error in errors])
+    return np.array([0.0 if abs(error) < rounding else float(f"{error:.4g}") for error in errors])
 
 
 # static responses, which are known exactly ----------------------------------------------------------------------------

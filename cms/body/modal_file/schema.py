@@ -518,7 +518,8 @@ GROUPS = {
             "date": (str, "day of the estimate, such as 2027-01-31"),
             "mesh_sign": (
                 str,
-                "optional: +: the frequencies with errors by the mesh are too high; +-: too high or too low",
+                "optional: +: the frequencies with errors by the mesh are too high; +-: too high or too low; signed: "
+                "too high where the error is positive",
             ),
             "mesh_method": (str, "optional: how the errors by the mesh were estimated, or why they are not known"),
         },

@@ -37,8 +37,8 @@ class MeshEstimate:
 
     @property
     def worst(self) -> float:
-        """Largest estimated error; NaN: none is known."""
-        known = self.errors.frequency[~np.isnan(self.errors.frequency)]
+        """Size of the largest estimated error; NaN: none is known."""
+        known = np.abs(self.errors.frequency[~np.isnan(self.errors.frequency)])
         return float(known.max(initial=0.0)) if len(known) else float("nan")
 
     def size_factor(self, error: float, rate: float = RATE) -> float:
@@ -59,7 +59,7 @@ class MeshEstimate:
         """
         if np.isnan(self.worst):
             return information("mesh-error", self.errors.method)
-        factor, k = self.size_factor(error, rate), int(np.nanargmax(self.errors.frequency))
+        factor, k = self.size_factor(error, rate), int(np.nanargmax(np.abs(self.errors.frequency)))
         return judge(
             "mesh-error", self.worst,
             f"mode {k + 1} of {len(self.frequencies)} has the largest error, {100 * self.worst:.2g} %; for "
@@ -83,7 +83,7 @@ class MeshEstimate:
                 f"converge: body {self.body.name!r}: a picture needs a surface and errors of its elements; got "
                 f"{len(surface)} triangles, and the error of the mesh: {self.errors.method}"
             )
-        eta2 = of_cells.max(axis=1)
+        eta2 = np.abs(of_cells).max(axis=1)
         factor = (eta2 * len(eta2) / (2 * error)) ** (1 / powers_of_size(model))
         return np.append(factor, 0.0)[surface_elements(model)]  # 0 where no error is known
 

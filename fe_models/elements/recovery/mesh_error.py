@@ -1,19 +1,19 @@
 r"""Energy error of the elements of a mesh, by recovered stress (Zienkiewicz & Zhu).
 
 (1) sample the stress where it is most accurate, and fit it to patches of elements (`patches`): sigma*. It has no
-    jumps between elements of one material, or between shell cells that meet smoothly
+    jumps between elements of one material
 (2) remove the traction of sigma* on the free surface of solids. Without this step, the shear stress of torsion and of
     bending would look exact in a wall of one or two layers of elements
-(3) integrate eta² = ∫ (sigma* - sigma) · C⁻¹ (sigma* - sigma) dV over each element, its energy error. For shells, N,
-    M and Q are in place of sigma; their drilling energy, which the exact solution does not have, is all error
+(3) integrate eta² = ∫ (sigma* - sigma) · C⁻¹ (sigma* - sigma) dV over each element, its energy error
 
 With M-normalised modes, an eigenvalue of conforming elements exceeds the exact one by lambda_h - lambda =
 |u - u_h|²_E - lambda |u - u_h|²_0, and the last term is of higher order. So sum eta² estimates lambda_h - lambda. For a
 rod of linear elements of length h, sigma = E u' is constant, sigma* - sigma is E u'' s about the middle, and sum eta² /
 lambda = (k h)² / 12, as in the exact eigenvalue lambda (1 + (k h)² / 12).
 
-Elements whose fields are not conforming, or whose energy is not fully integrated, also have errors that lower the
-eigenvalues. Then the sum only gives the size of an error of unknown sign.
+Solids whose fields are not conforming, or whose energy is not fully integrated, also have errors that lower the
+eigenvalues. Then the sum only gives the size of an error of unknown sign. Shells have a signed estimate of their own
+(`fe_models.elements.recovery.shell_consistency`).
 """
 
 from collections.abc import Iterator
@@ -25,9 +25,8 @@ from fe_models.body.fe_body import ElementModel
 from fe_models.body.weld import WeldedModel, mesh_rows
 from fe_models.elements.beams.model import BeamModel
 from fe_models.elements.recovery.patches import PatchCells, patch_recovery
-from fe_models.elements.shells.elements import STRAIN_DEGREE, ShellCells
+from fe_models.elements.recovery.shell_consistency import signed_errors
 from fe_models.elements.shells.model import ShellModel
-from fe_models.elements.shells.shapes import flat_quadrature, flat_shape
 from fe_models.elements.shells.stiffeners import StiffenedModel
 from fe_models.elements.solids.body import SolidModel
 from fe_models.elements.solids.elements import ShapeTable, reference_element
@@ -39,7 +38,7 @@ from fe_models.meshes.boundary import CORNERS, boundary_facets, facets_of
 from fe_models.meshes.cell_shapes import CELL_SHAPES
 from fe_models.meshes.mesh import Mesh
 
-__all__ = ["EnergyErrors", "energy_errors", "powers_of_size", "surface_elements", "without_estimate"]
+__all__ = ["EnergyErrors", "energy_errors", "powers_of_size", "skin_nodes", "surface_elements", "without_estimate"]
 
 SAMPLE_BYTES = 4e8  #: size of the sampled stress that is in memory at a time [bytes]
 #: cells whose reduced integration leaves out a part of the strain energy, also if their edges are straight
@@ -50,15 +49,16 @@ SYMMETRIC = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))  #: components of a
 
 @dataclass(frozen=True, eq=False)
 class EnergyErrors:
-    """Energy errors of the elements whose stress can be recovered, numbered by part of the body, type and cell."""
+    """Energy errors of the elements that have an estimate, numbered by part of the body, type and cell."""
 
-    error: Array  #: eta² of each element and column, (n_cells, k) [J]
+    error: Array  #: share of each element in lambda_h - lambda of each column; of solids eta², (n_cells, k) [J]
     energy: Array  #: twice the strain energy of each element and column, (n_cells, k) [J]
-    nonconforming: str  #: why the sign of the error of a frequency is not known; "": the frequencies are too high
+    nonconforming: str  #: why the sign of the error of a frequency is not known; "": it is known
+    is_signed: bool = False  #: whether errors may be negative, because elements are shells
 
     @property
     def total(self) -> Array:
-        """Sum of eta² over the elements, (k,) [J]."""
+        """Sum over the elements, (k,) [J]."""
         return np.asarray(self.error.sum(axis=0))
 
 
@@ -76,7 +76,7 @@ def without_estimate(model: ElementModel | None) -> str:
     return "the stress of beams is not recovered" if isinstance(model, BeamModel) else "no element has stress"
 
 
-def energy_errors(model: ElementModel, u: Array, loaded: IntArray) -> EnergyErrors:
+def energy_errors(model: ElementModel, u: Array, lam: Array, loaded: IntArray) -> EnergyErrors:
     """Return the energy errors of all solid and shell elements for displacement columns.
 
     Parameters
@@ -84,29 +84,33 @@ def energy_errors(model: ElementModel, u: Array, loaded: IntArray) -> EnergyErro
     model
         Element model for which `without_estimate` returns "".
     u
-        Displacement columns over the dofs of the mesh, (n_mesh_dof, k).
+        Displacement columns over the dofs of the mesh, (n_mesh_dof, k); for shells, M-normalised modes.
+    lam
+        Eigenvalues of the modes, (k,); solids do not use them.
     loaded
-        Nodes on which something else than inertia may act. Elsewhere the surface of solids is free of traction.
+        Nodes on which something else than inertia may act. Elsewhere the surface of solids is free of traction, and
+        the edges of shells are free of moments.
     """
-    found = list(errors_of_parts(model, np.asarray(u), loaded))
+    found = list(errors_of_parts(model, np.asarray(u), lam, loaded))
     return EnergyErrors(
         np.concatenate([each.error for each in found]),
         np.concatenate([each.energy for each in found]),
         next((each.nonconforming for each in found if each.nonconforming), ""),
+        any(each.is_signed for each in found),
     )
 
 
-def errors_of_parts(model: ElementModel, u: Array, loaded: IntArray) -> Iterator[EnergyErrors]:
+def errors_of_parts(model: ElementModel, u: Array, lam: Array, loaded: IntArray) -> Iterator[EnergyErrors]:
     """Yield the energy errors of the parts of a body that have an estimate."""
     if isinstance(model, WeldedModel):
         first = np.cumsum([0, *model.n_nodes])[:-1]
         for part, rows, begin in zip(model.parts, mesh_rows(model.n_mesh_dof), first, strict=True):
             if not without_estimate(part):
-                yield from errors_of_parts(part, u[rows], loaded - begin)
+                yield from errors_of_parts(part, u[rows], lam, loaded - begin)
     elif isinstance(model, StiffenedModel):
-        yield shell_errors(model.shell, u[: model.shell.n_mesh_dof])
+        yield from errors_of_parts(model.shell, u[: model.shell.n_mesh_dof], lam, np.union1d(loaded, model.nodes))
     elif isinstance(model, ShellModel):
-        yield shell_errors(model, u)
+        yield EnergyErrors(*signed_errors(model, u, lam, loaded), "", is_signed=True)
     elif isinstance(model, SolidModel):
         yield solid_errors(model, u, loaded)
 
@@ -127,6 +131,16 @@ def surface_elements(model: ElementModel | None) -> IntArray:
     if isinstance(model, ShellModel):
         return model.skin.cell_of
     return np.full(len(model.skin.triangles) if isinstance(model, BeamModel) else 0, -1)
+
+
+def skin_nodes(model: ElementModel | None) -> IntArray:
+    """Return the nodes of a body that are points on the skin of shells, which follow nodes and bear no load."""
+    if isinstance(model, WeldedModel):
+        first = np.cumsum([0, *model.n_nodes])
+        return np.concatenate([skin_nodes(part) + begin for part, begin in zip(model.parts, first, strict=False)])
+    if isinstance(model, StiffenedModel):
+        return skin_nodes(model.shell)
+    return model.n_nodes + np.arange(len(model.skin.points)) if isinstance(model, ShellModel) else np.zeros(0, np.int64)
 
 
 def powers_of_size(model: ElementModel | None) -> IntArray:
@@ -321,97 +335,3 @@ def affine_cells(model: SolidModel, kind: str) -> tuple[IntArray, IntArray]:
     if kind == "tetra10":
         is_affine = bends_of_cells(model.mesh.nodes, cells) <= CURVED
     return np.flatnonzero(is_affine), np.flatnonzero(~is_affine)
-
-
-# shells ---------------------------------------------------------------------------------------------------------------
-
-
-def shell_errors(model: ShellModel, u: Array) -> EnergyErrors:
-    """Return the energy errors of a shell, in blocks of columns.
-
-    The resultants are recovered as tensors N and M and vectors Q in mesh axes, separately on each smooth patch of
-    cells.
-    """
-    n_rows = model.skin.n_patches
-    places = np.zeros((n_rows, 3))
-    groups, n_samples = [], 0
-    for group, patch in zip(model.groups, model.skin.patch, strict=True):
-        places[patch.ravel()] = group.planes.corners.reshape(-1, 3)
-        shape = corner_values(group)
-        groups.append(PatchCells(patch, patch.shape[1], (), np.einsum("pc,nci->npi", shape, group.planes.corners)))
-        n_samples += len(patch) * len(shape)
-    recovery = patch_recovery(places, groups, 1, is_surface=True)
-    errors, energies = [], []
-    for columns in column_blocks(u, 8 * 24 * n_samples):
-        k = columns.shape[1]
-        resultants = [cell_resultants(group, columns) for group in model.groups]
-        sampled = [
-            in_mesh_axes(group.planes.R, values).reshape(-1, 15 * k)
-            for group, (values, _) in zip(model.groups, resultants, strict=True)
-        ]
-        recovered = recovery.at_nodes(np.concatenate(sampled)).reshape(-1, 15, k)
-        parts = [
-            shell_defects(group, values, weights, np.einsum("pc,nctk->nptk", corner_values(group), recovered[patch]))
-            for group, patch, (values, weights) in zip(model.groups, model.skin.patch, resultants, strict=True)
-        ]
-        errors.append(np.concatenate([part[0] for part in parts]))
-        energies.append(np.concatenate([part[1] for part in parts]))
-    reason = "shell elements are not conforming, and errors of the first modes may be several times larger"
-    return EnergyErrors(np.hstack(errors), np.hstack(energies), reason)
-
-
-def corner_values(group: ShellCells) -> Array:
-    """Return the shape functions of the corners at the strain points, (n_points, c)."""
-    return flat_shape(group.kind, flat_quadrature(group.kind, STRAIN_DEGREE[group.kind])[0]).values
-
-
-def cell_resultants(group: ShellCells, u: Array) -> tuple[Array, Array]:
-    """Return N, M, Q and the drilling moment at the strain points, (n, p, 9, k), and areas of the points, (n, p)."""
-    values, weights = [], []
-    for rows in group.chunks():
-        strains = group.strains(rows)
-        n, p, _, d = strains.B.shape
-        found = (strains.B.reshape(n, 9 * p, d) @ u[group.dofs[rows]]).reshape(n, p, 9, -1)
-        values.append(group.elasticity(rows)[:, None] @ found)
-        weights.append(strains.weights)
-    return np.concatenate(values), np.concatenate(weights)
-
-
-def in_mesh_axes(R: Array, resultants: Array) -> Array:
-    """Return N and M as tensors (xx yy zz yz xz xy) and Q as vectors in mesh axes, (n, p, 15, k)."""
-    return np.asarray(directions_of(R)[:, None] @ resultants[:, :, :8])
-
-
-def directions_of(R: Array) -> Array:
-    """Return the map from N, M, Q in local axes to their 15 components in mesh axes, (n, 15, 8)."""
-    found = np.zeros((len(R), 15, 8))
-    for column, (i, j) in enumerate(((0, 0), (1, 1), (0, 1))):
-        tensor = R[:, :, i, None] * R[:, None, :, j]
-        if i != j:
-            tensor = tensor + tensor.transpose(0, 2, 1)
-        for row, (a, b) in enumerate(SYMMETRIC):
-            found[:, row, column] = found[:, 6 + row, 3 + column] = tensor[:, a, b]
-    found[:, 12:, 6:] = R[:, :, :2]
-    return found
-
-
-def shell_defects(group: ShellCells, resultants: Array, weights: Array, recovered: Array) -> tuple[Array, Array]:
-    """Return eta² and twice the strain energy of the cells, (n, k) each [J].
-
-    Parameters
-    ----------
-    resultants, weights
-        As `cell_resultants` returns them.
-    recovered
-        Recovered resultants at the strain points in mesh axes, (n, p, 15, k).
-    """
-    to_local = directions_of(group.planes.R).transpose(0, 2, 1).copy()
-    to_local[:, [2, 5]] /= 2  # a shear component is the mean of the two equal components of the tensor
-    twice = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 1.0, 1.0, 1.0])
-    d = -resultants
-    d[:, :, :8] += (to_local * twice)[:, None] @ recovered
-    inverse = np.empty((len(resultants), 9, 9))
-    for rows in group.chunks():
-        inverse[rows] = np.linalg.pinv(group.elasticity(rows), hermitian=True)
-    S = weights[:, :, None, None] * inverse[:, None]
-    return (d * (S @ d)).sum(axis=(1, 2)), (resultants * (S @ resultants)).sum(axis=(1, 2))

@@ -62,9 +62,7 @@ class PatchRecovery:
         return found
 
 
-def patch_recovery(
-    nodes: Array, groups: Sequence[PatchCells], order: int, *, is_surface: bool = False
-) -> PatchRecovery:
+def patch_recovery(nodes: Array, groups: Sequence[PatchCells], order: int) -> PatchRecovery:
     """Return the map from samples, numbered by group, cell and point, to nodes.
 
     Parameters
@@ -75,8 +73,6 @@ def patch_recovery(
         Cells, whose samples belong to the same smooth field.
     order
         Order of the polynomials, 1 or 2.
-    is_surface
-        Whether the cells lie on a surface, along whose normals nothing varies.
     """
     corner_nodes = np.unique(np.concatenate([group.nodes[:, : group.n_corners].ravel() for group in groups]))
     number = np.full(len(nodes), -1, np.int64)
@@ -98,7 +94,6 @@ def patch_recovery(
             spread[:, i, j] = spread[:, j, i] = total(offset[:, i] * offset[:, j]) / count[:, 0]
     variance, axes = np.linalg.eigh(spread)
     is_flat = variance <= FLAT**2 * variance[:, 2:]
-    is_flat[:, 0] |= is_surface
     scale = np.where(is_flat, 0.0, 1 / np.sqrt(np.where(is_flat, 1.0, variance)))
     to_local = axes * scale[:, None]
 

@@ -8,6 +8,7 @@ from numpy.testing import assert_array_equal
 
 import cms
 import fe_models as fm
+from cms.cli.info import MESH_SIGNS, error_percent
 from cms.modes.families.families import Families
 from cms.modes.mode_sets import MODE_SETS
 from cms.reduction.basis.free_basis import free_basis
@@ -16,6 +17,7 @@ from cms.reduction.reduction import reduce
 from fe_models.body.fe_body import Interface
 from fe_models.elements.recovery.mesh_error import EnergyErrors
 from tests.bodies import beam, box_mesh
+from tests.mindlin_plate import free_plate_eigenvalues
 
 MM = fm.unit_system("mm-kg-ms")
 STEEL = fm.Material("steel", 210.0, 0.3, 7.85e-6)  # GPa = kg / (mm ms²)
@@ -87,6 +89,35 @@ def test_elements_that_may_lower_frequencies_have_errors_of_unknown_sign(options
     assert errors.mesh_sign == "+-"
     assert errors.mesh_method.startswith("recovered stress of elements; sign not known: ")
     assert (errors.mesh > 0).all()
+
+
+def thin_plate(interfaces=()):
+    """A plate of coarse quads in general position, whose highest frequencies are too low."""
+    mesh = fm.shells.mapped_shell(lambda u, v: np.stack([100 * u, 70 * v, 0 * u], axis=1), 10, 7, kind="quad")
+    mesh = replace(mesh, nodes=mesh.nodes @ TURN.T + [500.0, 80.0, -60.0])
+    faces = [fm.shells.shell_interface(mesh, name, fm.selections.NearestNode(mesh.nodes[k])) for name, k in interfaces]
+    return fm.shell_body(mesh, fm.shells.ShellProperty(0.4, STEEL), name="sheet", units=MM, interfaces=faces)
+
+
+def test_errors_of_shells_have_a_sign_which_survives_a_file(tmp_path):
+    made = modes_of(thin_plate(), 8)
+    true = made.free_frequencies[:8] * 2 * np.pi / np.sqrt(free_plate_eigenvalues((100.0, 70.0), 0.4, STEEL, 8)) - 1
+    is_large = np.abs(true) > 2e-3
+    assert set(np.sign(true[is_large])) == {-1.0, 1.0}
+    ratio = made.errors.mesh[:8][is_large] / true[is_large]
+    assert ((ratio > 0.5) & (ratio < 2)).all(), (true, made.errors.mesh)
+    assert made.errors.mesh_sign == "signed"
+    cms.write(made, tmp_path / "sheet.h5")
+    back = cms.read(tmp_path / "sheet.h5").errors
+    assert_array_equal(back.mesh, made.errors.mesh)
+    assert back.mesh_sign == "signed"
+    assert error_percent(-0.0123, MESH_SIGNS["signed"]) == "-1.2 %"
+    assert error_percent(0.0123, MESH_SIGNS["signed"]) == "+1.2 %"
+
+
+def test_the_skin_of_a_shell_loads_no_node():
+    body = fm.couple(thin_plate([("corner", 0), ("edge", 5)]))
+    assert_array_equal(loaded_nodes(body), [0, 5])
 
 
 def test_what_has_no_stress_has_no_estimate_but_a_reason(tmp_path):
