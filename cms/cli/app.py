@@ -164,7 +164,7 @@ def converge_command(
 ) -> None:
     """Mesh error of a job, and the element size for a wanted error.
 
-    The errors of the free frequencies are estimated from the stress on the mesh. For a CAD job, a coarser mesh is made
+    The errors of the free frequencies are estimated from the modes on the mesh. For a CAD job, a coarser mesh is made
     too, and the frequencies of both are compared.
 
     Example: cms converge part.toml

@@ -85,7 +85,7 @@ def run_converge(request: ConvergeRequest, changes: Mapping[str, Any]) -> None:
         print_estimate(record)
     else:
         print_convergence(result, record)
-    say(f"from the stress on this mesh alone: {record['mesh_method']}")
+    say(f"from this mesh alone: {record['mesh_method']}")
     print_records("Mesh", estimate.body.name, (verdict,))
     if request.output is not None:
         say(f"wrote {request.output}")

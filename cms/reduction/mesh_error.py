@@ -1,4 +1,4 @@
-"""Estimated errors of free frequencies by the mesh, from the stress of the modes on this mesh alone.
+"""Estimated errors of free frequencies by the mesh, from the modes on this mesh alone.
 
 With eta² = lambda_h - lambda of `fe_models.elements.recovery.mesh_error`, f_h / f = 1 / sqrt(1 - eta² / lambda_h).
 """

@@ -247,6 +247,7 @@ class Cells:
     K: Array  #: stiffness, (n, 6 c, 6 c)
     M: Array  #: mass, (n, 6 c, 6 c)
     u: Array  #: columns at the nodes, (n, 6 c, k)
+    areas: Array  #: areas of the cells, (n,) [m²]
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,12 +264,12 @@ def patch_planes(groups: list[Cells], near: Neighbours) -> Patches:
     n = len(near.middle)
     R, origin, A, D, flexibility = (np.zeros((n, *s)) for s in ((3, 3), (3,), (3, 3), (3, 3), (2, 2)))
     for part in groups:
-        rows = np.flatnonzero((near.middle >= part.first) & (near.middle < part.first + len(part.X)))
-        cells, group = near.middle[rows] - part.first, part.group
-        R[rows], origin[rows] = group.planes.R[cells], part.X[cells].mean(axis=1)
+        own = np.flatnonzero((near.middle >= part.first) & (near.middle < part.first + len(part.X)))
+        middle, group = near.middle[own] - part.first, part.group
+        R[own], origin[own] = group.planes.R[middle], part.X[middle].mean(axis=1)
         laws = [(law.A, law.bending, np.linalg.inv(law.H)) for law in group.laws]
-        for values, own in zip((A, D, flexibility), zip(*laws, strict=True), strict=True):
-            values[rows] = np.array(own)[group.law[cells]]
+        for values, of_law in zip((A, D, flexibility), zip(*laws, strict=True), strict=True):
+            values[own] = np.array(of_law)[group.law[middle]]
     whole = Patches(R, origin, np.ones(n), np.zeros((n, 1)), A, D, flexibility)
     size, surface = np.empty(n), np.empty((n, (SURFACE_DEGREE + 1) * (SURFACE_DEGREE + 2) // 2))
     for rows in chunks(n):
@@ -326,18 +327,18 @@ def fitted_fields(groups: list[Cells], near: Neighbours, lowest: float) -> Fitte
             cells, is_cell = cells_of(near, rows, part)
             m, c = cells.shape[1], part.X.shape[1]
             nodes = at.local(part.X[cells].reshape(n, -1, 3))
-            P = surface_fields(at, nodes[..., 0], nodes[..., 1]).motions(at.R).reshape(n, m, 6 * c, -1)
-            KP = ((part.K[cells] + lowest * part.M[cells]) * is_cell[..., None, None]) @ P
-            KP, P = KP.reshape(n, m * 6 * c, -1), P.reshape(n, m * 6 * c, -1)
-            G += np.swapaxes(P, 1, 2) @ KP
-            rhs += np.swapaxes(KP, 1, 2) @ part.u[cells].reshape(n, m * 6 * c, k)
+            P = surface_fields(at, nodes[..., 0], nodes[..., 1]).motions(at.R).reshape(n, m * 6 * c, -1)
+            K = (part.K[cells] + lowest * part.M[cells]) * is_cell[..., None, None]
+            P_K = np.swapaxes((K @ P.reshape(n, m, 6 * c, -1)).reshape(P.shape), 1, 2)
+            G += P_K @ P
+            rhs += P_K @ part.u[cells].reshape(n, m * 6 * c, k)
             values = flat_shape(
                 part.group.kind, flat_quadrature(part.group.kind, STRAIN_DEGREE[part.group.kind])[0]
             ).values
             points = np.einsum("pc,nmca->nmpa", values, nodes.reshape(n, m, c, 3)[..., :2])
             x.append(points[..., 0].reshape(n, -1))
             y.append(points[..., 1].reshape(n, -1))
-            areas.append(np.repeat(part.group.areas()[cells] * is_cell / len(values), len(values), axis=1))
+            areas.append(np.repeat(part.areas[cells] * is_cell / len(values), len(values), axis=1))
         place, area = (np.concatenate(x, axis=1), np.concatenate(y, axis=1)), np.concatenate(areas, axis=1)
         strain = surface_fields(at, *place).strain[:, :, :3]
         linear = terms(*place, 1)
@@ -369,8 +370,8 @@ def signed_errors(model: ShellModel, u: Array, lam: Array, loaded: IntArray) -> 
     """
     nodes, first, groups = mesh_nodes(model), 0, []
     for group in model.groups:
-        M = group.mass_matrices()
-        groups.append(Cells(group, first, nodes[group.cells], group.stiffness(), M, u[group.dofs]))
+        matrices = group.stiffness(), group.mass_matrices()
+        groups.append(Cells(group, first, nodes[group.cells], *matrices, u[group.dofs], group.areas()))
         first += len(group.cells)
     near = neighbours(model, np.concatenate([part.X.mean(axis=1) for part in groups]))
     fields = fitted_fields(groups, near, float(lam.min()))

@@ -127,3 +127,23 @@ def test_walls_of_few_cells_have_finite_estimates():
     found = energy_errors(body.element_model, body.mesh_displacement(modes.Phi[:, :3]), modes.omega2[:3], NOWHERE)
     assert np.isfinite(found.error).all()
     assert found.error.shape == (3, 3)
+
+
+def test_bending_of_a_curved_panel_has_the_error_of_its_flat_cells():
+    """Modes 2 and 4 hardly twist; a mesh of a quarter of the size is the reference."""
+
+    def modes_of(n):
+        mesh = fm.shells.mapped_shell(
+            lambda u, v: np.stack([100 * u, 70 * v, 60 * u * (1 - u)], axis=1), n, 7 * n // 10, kind="quad"
+        )
+        body = fm.shell_body(
+            replace(mesh, nodes=mesh.nodes @ TURN.T), fm.shells.ShellProperty(2.0, STEEL), name="panel", units=MM
+        )
+        with Families(body, announce=False) as families:
+            modes = families.free_modes(4)
+        return body, modes.omega2[:4], modes.Phi[:, :4]
+
+    (body, lam, Phi), (_, exact, _) = modes_of(10), modes_of(40)
+    found = energy_errors(body.element_model, body.mesh_displacement(Phi), lam, NOWHERE)
+    ratio = (found.total / lam)[[1, 3]] / (1 - exact / lam)[[1, 3]]
+    assert ((ratio > 0.6) & (ratio < 1.6)).all(), ratio
