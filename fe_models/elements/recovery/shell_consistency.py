@@ -246,8 +246,13 @@ class Cells:
     X: Array  #: nodes of the cells, (n, c, 3) [m]
     K: Array  #: stiffness, (n, 6 c, 6 c)
     M: Array  #: mass, (n, 6 c, 6 c)
-    u: Array  #: columns at the nodes, (n, 6 c, k)
     areas: Array  #: areas of the cells, (n,) [m²]
+    dofs: IntArray  #: dofs of the nodes, (n, 6 c)
+    u: Array  #: columns over the dofs of the nodes, (n_dof, k)
+
+    def columns(self, rows: slice | IntArray) -> Array:
+        """Return the columns over the dofs of some cells, (..., 6 c, k)."""
+        return np.asarray(self.u[self.dofs[rows]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,7 +321,7 @@ def ridge_solve(G: Array, rhs: Array, degree: int, n_fields: int = 1) -> Array:
 
 def fitted_fields(groups: list[Cells], near: Neighbours, lowest: float) -> FittedFields:
     """Return u on all patches, by step (3); `lowest` is the lowest eigenvalue."""
-    planes, k = patch_planes(groups, near), groups[0].u.shape[2]
+    planes, k = patch_planes(groups, near), groups[0].u.shape[1]
     coefficients, membrane = np.empty((len(planes.size), 3 * N_TERMS, k)), np.empty((len(planes.size), 3, 3, k))
     for rows in chunks(len(planes.size)):
         at = planes[rows]
@@ -331,7 +336,7 @@ def fitted_fields(groups: list[Cells], near: Neighbours, lowest: float) -> Fitte
             K = (part.K[cells] + lowest * part.M[cells]) * is_cell[..., None, None]
             P_K = np.swapaxes((K @ P.reshape(n, m, 6 * c, -1)).reshape(P.shape), 1, 2)
             G += P_K @ P
-            rhs += P_K @ part.u[cells].reshape(n, m * 6 * c, k)
+            rhs += P_K @ part.columns(cells).reshape(n, m * 6 * c, k)
             values = flat_shape(
                 part.group.kind, flat_quadrature(part.group.kind, STRAIN_DEGREE[part.group.kind])[0]
             ).values
@@ -371,7 +376,7 @@ def signed_errors(model: ShellModel, u: Array, lam: Array, loaded: IntArray) -> 
     nodes, first, groups = mesh_nodes(model), 0, []
     for group in model.groups:
         matrices = group.stiffness(), group.mass_matrices()
-        groups.append(Cells(group, first, nodes[group.cells], *matrices, u[group.dofs], group.areas()))
+        groups.append(Cells(group, first, nodes[group.cells], *matrices, group.areas(), group.dofs, u))
         first += len(group.cells)
     near = neighbours(model, np.concatenate([part.X.mean(axis=1) for part in groups]))
     fields = fitted_fields(groups, near, float(lam.min()))
@@ -379,7 +384,7 @@ def signed_errors(model: ShellModel, u: Array, lam: Array, loaded: IntArray) -> 
     for part in groups:
         for rows in chunks(len(part.X)):
             errors.append(cell_errors(part, rows, fields, near.of_cell[part.first :][rows], lam))
-            own = part.u[rows]
+            own = part.columns(rows)
             energies.append((own * (part.K[rows] @ own)).sum(axis=1))
     # errors of both signs alternate between cells; only those of some neighbours together show where the mesh is coarse
     around = sp.csr_array(near.around != 0, dtype=float)
@@ -403,7 +408,7 @@ def cell_errors(part: Cells, rows: slice, fields: FittedFields, patch: IntArray,
     n, k = len(patch), c.shape[2]
     nodes = at.local(part.X[rows])[..., :2]
     v = (surface_fields(at, nodes[..., 0], nodes[..., 1]).motions(at.R) @ c[:, None]).reshape(n, -1, k)
-    e = part.u[rows] - v
+    e = part.columns(rows) - v
     found = (v * (part.K[rows] @ v) - e * (part.K[rows] @ e)).sum(axis=1)
     found -= lam * (v * (part.M[rows] @ v) - e * (part.M[rows] @ e)).sum(axis=1)
     points, w = flat_quadrature(group.kind, ENERGY_DEGREE[group.kind])
