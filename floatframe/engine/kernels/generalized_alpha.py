@@ -415,6 +415,12 @@ def add_reactions(model, work, c_k):
                 work.state.w[k] += work.solver.mu[k] / c_k
 
 
+@small
+def will_be_small(correction, last, left):
+    """Whether the next correction is at most `left` by the ratio of the last two; last is infinite if none is known."""
+    return last < math.inf and correction <= FAST * last and correction * correction <= last * left
+
+
 @inner
 def is_enough(norm, last, wanted, allowed):
     """Whether a correction is small enough, or the next one will be by the ratio of the last two.
@@ -422,8 +428,19 @@ def is_enough(norm, last, wanted, allowed):
     allowed: the wanted size plus roundoff. The limit for a correction that is omitted contains less roundoff, because
     the errors left by omitted corrections have the same sign in all steps.
     """
-    left = SAFE * (wanted + OF_ROUNDOFF * (allowed - wanted))
-    return norm <= allowed or (last < math.inf and norm <= FAST * last and norm * norm <= last * left)
+    return norm <= allowed or will_be_small(norm, last, SAFE * (wanted + OF_ROUNDOFF * (allowed - wanted)))
+
+
+@inner
+def are_states_enough(change, last, iteration):
+    """Whether a correction of states, divided by the tolerance, is small enough, will be, or does not fall any more.
+
+    States follow the bodies by one iteration, so that the ratio of their first two corrections predicts nothing.
+    """
+    if iteration <= 1:
+        return change <= 1.0
+    is_stuck = change <= 1e3 and change > 0.5 * last and iteration > 2
+    return change <= 1.0 or will_be_small(change, last, SAFE) or is_stuck
 
 
 @inner
@@ -634,7 +651,7 @@ def one_step(model, work, memory, order, h):
             is_new = of_states > max(1.0, SLOW * last_of_states)
         is_stuck = norm <= 1e3 * allowed and norm > 0.5 * last and iteration > 2
         is_small = is_enough(norm, last, wanted, allowed) or is_stuck
-        if is_small and (of_states <= 1.0 or (of_states <= 1e3 and of_states > 0.5 * last_of_states and iteration > 2)):
+        if is_small and are_states_enough(of_states, last_of_states, iteration):
             take_age(work.solver, iteration + 1)
             if is_aged:
                 work.solver.is_due = 1
