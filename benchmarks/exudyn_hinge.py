@@ -5,7 +5,7 @@
     python -m benchmarks.exudyn_hinge 1.4 --alone  # ours alone
 
 A plate of 400 x 40 x 20 mm with a bolt and a bushing, linear tetrahedra, 8 free modes beside the rigid ones. The
-tutorial (NGsolveCMStutorial.py) meshes the same shape by Netgen; a comment there gives 1540 s for the modes of 203 443
+tutorial meshes the same shape by Netgen; a comment there gives 1540 s for the modes of 203 443
 nodes. Here gmsh meshes it. Each side is a process of its own that loads K, M and the nodes; the time is from the
 matrices in memory to the modes. Exudyn: `FEMinterface.ComputeEigenmodes`, as in the tutorial; ours: `normal_modes`,
 checks included. Memory: peak of the process above what it held before. Both must find the same frequencies.

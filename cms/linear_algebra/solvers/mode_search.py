@@ -72,6 +72,7 @@ class BlockLanczos:
         self._T = np.zeros((self.capacity + block, self.capacity + block))
         self._random = np.random.default_rng(0)
         self._M_next = self._start()  # M V_{j+1}; V_{j+1} itself is stored after V
+        self.is_exhausted = self._M_next.shape[1] == 0  #: whether V spans the whole range of the operator
         self._R = np.zeros((self._M_next.shape[1], 0))  # coupling of the next block to all columns of V
         self._coupled = 0  # index of the first column of V to which the next block is coupled
 
@@ -84,11 +85,6 @@ class BlockLanczos:
     def V_and_next(self) -> Any:
         """Basis V and the next block, (n, m + b)."""
         return self._columns[:, : self.m + self._M_next.shape[1]]
-
-    @property
-    def is_exhausted(self) -> bool:
-        """Whether V spans the whole range of the operator."""
-        return self._M_next.shape[1] == 0
 
     def grow(self, capacity: int) -> None:
         """Allocate memory for more columns."""
@@ -125,6 +121,7 @@ class BlockLanczos:
             self._R = np.zeros((M_next.shape[1], last))
             self._coupled = last
         self._M_next = M_next
+        self.is_exhausted = M_next.shape[1] == 0
 
     def ritz(self) -> RitzPairs:
         """Return the eigenpairs of T and their residuals |R s|."""

@@ -133,7 +133,8 @@ def product_row(product: Function) -> Held:
             driven = rate_in_time(one, work.markers, a, b)
         return motion_rate(one, work.markers, a, b) + driven
 
-    return Held(*(own_name(each, f"{product.py_func.__name__}_{each.__name__}") for each in (value, rates, gap, rate)))
+    made = [own_name(each, f"{product.__name__}_{each.__name__}") for each in (value, rates, gap, rate)]
+    return Held(*made)
 
 
 def other_row(value: Function, rates: Function, by_place: Function | None = None) -> Held:
@@ -148,8 +149,8 @@ def other_row(value: Function, rates: Function, by_place: Function | None = None
         in_time, _ = rates(model, work, k, a, b)
         return in_time + rate_along(work.markers, a, b, n, m_a, m_b)
 
-    name = value.py_func.__name__
-    return Held(value, rates, *(own_name(each, f"{name}_{each.__name__}") for each in (gap, rate)), by_place)
+    gap, rate = (own_name(each, f"{value.__name__}_{each.__name__}") for each in (gap, rate))
+    return Held(value, rates, gap, rate, by_place)
 
 
 class Wrench(NamedTuple):
