@@ -84,6 +84,12 @@ def joint_forces(
         for row, name in zip(rows, owner, strict=True)
     ]
     ordered = [force for group in of_row for force in group]
+    for force in forces:
+        if not any(force is other for other in ordered):
+            raise ModelError(
+                f"force {force.name!r}: coordinate {force.coordinate!r} of joint {force.joint!r} follows a deformed "
+                "line and cannot take a force; take a user force along an axial distance between two markers"
+            )
     record = filled(
         JointForces(),
         stiffness=[force.stiffness for force in ordered],

@@ -15,6 +15,7 @@ from floatframe import (
     FlexibleBody,
     GeneralizedAlpha,
     Gravity,
+    JointForce,
     Marker,
     PointForce,
     PrismaticJoint,
@@ -227,6 +228,13 @@ def test_impossible_lines_are_refused(options, text):
                 units=UNITS,
             )
         )
+
+
+def test_a_force_along_the_deformed_line_is_refused_and_not_left_out():
+    system = swinging(False, beam())
+    rub = JointForce("rub", "slide", "distance", preload=3.0)
+    with pytest.raises(ModelError, match="'distance' of joint 'slide' follows a deformed line and cannot take a force"):
+        compiled_system(System(system.bodies, system.joints, [*system.forces, rub], UNITS))
 
 
 def test_a_line_needs_a_flexible_body():
