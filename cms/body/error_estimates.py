@@ -10,7 +10,9 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ArgumentError
 from fe_models.foundation.records import ArrayShape, checked_fields, frozen_copies
 
-__all__ = ["ErrorEstimates", "are_uncertain"]
+__all__ = ["MESH_SIGNS", "ErrorEstimates", "are_uncertain"]
+
+MESH_SIGNS = {"+": "+", "+-": "±", "signed": "+"}  #: sign of a positive error by the mesh, by `mesh_sign`
 
 UNCERTAIN = 5.0  #: ratio of the largest error to the estimate, above which the estimate is uncertain
 ROUNDING = 1e-9  #: largest error that is rounding

@@ -10,7 +10,7 @@ import numpy as np
 import typer
 
 from cms.cli.console import print_table, say, stages, vector_words
-from cms.cli.info import MESH_SIGNS, error_percent
+from cms.cli.info import error_percent
 from cms.cli.outputs import output_file
 from cms.cli.verdicts.check import print_records
 from cms.errors import JobError
@@ -145,6 +145,8 @@ def record_of_convergence(result: "MeshConvergence", request: ConvergeRequest) -
 
 def print_estimate(record: dict[str, Any]) -> None:
     """Print the frequencies of one mesh with their estimated errors."""
+    from cms.body.error_estimates import MESH_SIGNS
+
     sign = MESH_SIGNS[record["mesh_sign"]]
     rows = [
         (str(k), f"{f:.6g}", error_percent(error, sign))
@@ -155,6 +157,8 @@ def print_estimate(record: dict[str, Any]) -> None:
 
 def print_convergence(result: "MeshConvergence", record: dict[str, Any]) -> None:
     """Print the frequencies of two meshes, and the errors of the finer one."""
+    from cms.body.error_estimates import MESH_SIGNS
+
     symbol = result.estimates[1].body.units.length_symbol
     coarse, fine = (f"size {size:g} {symbol} [Hz]>" for size in result.sizes)
     errors = [error_percent(error, MESH_SIGNS[record["mesh_sign"]]) for error in record["mesh_error"]]

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 __all__ = ["info_command", "info_record", "print_body"]
 
 ROUNDING = 1e-9  #: relative error, below which the output says "exact"
-MESH_SIGNS = {"+": "+", "+-": "±", "signed": "+"}
 MOST_SETS = 20  #: largest number of sets in the output
 
 
@@ -129,6 +128,8 @@ def print_body(body: "ReducedBody", *, everything: bool = False, has_warned: boo
 
 def print_free_frequencies(record: Any) -> None:
     """Print the frequencies of the free body, with their estimated errors if these are known."""
+    from cms.body.error_estimates import MESH_SIGNS
+
     title = "Frequencies as held" if record["is_held"] else "Free-free frequencies"
     frequencies, errors = [hertz(f) for f in record["free_frequencies_hz"]], record["errors"]
     if errors is None:

@@ -268,17 +268,17 @@ LOWEST = 6  #: number of the lowest free frequencies whose error by the mesh is 
 
 
 def with_estimate_of_file(error: MeshError, reduced: ReducedBody) -> MeshError:
-    """Add the estimates that the modal file has, from the stress of the modes, if no mesh was refined."""
+    """Add the estimates that the modal file has, from the modes on its mesh, if no mesh was refined."""
     of_modes = np.zeros(0) if reduced.errors is None else reduced.errors.mesh[:LOWEST]
     if error.estimate is not None or reduced.errors is None or np.isnan(of_modes).all():
         return error
-    largest = float(np.nanmax(of_modes))
-    too = "too high" if reduced.errors.mesh_sign == "+" else "too high or too low"
+    worst = float(of_modes[np.nanargmax(np.abs(of_modes))])
+    too = "too high or too low" if reduced.errors.mesh_sign == "+-" else "too high" if worst > 0 else "too low"
     words = (
-        f"{error.words}; by the stress of the modes on this mesh, which the file has on record, the lowest "
-        f"{len(of_modes)} free frequencies lie {too} by up to {100 * largest:.2g} %"
+        f"{error.words}; by the modes on this mesh, which the file has on record, the lowest "
+        f"{len(of_modes)} free frequencies lie {too} by up to {100 * abs(worst):.2g} %"
     )
-    return replace(error, words=words, of_file=largest)
+    return replace(error, words=words, of_file=abs(worst))
 
 
 # A received body against a full model of the same part: mass, free frequencies, and shapes at nodes in common ---------

@@ -16,7 +16,7 @@ from cms.assessment.report.formatting import hertz
 from cms.assessment.report.parts import records_table
 from cms.assessment.report.png import png_of
 from cms.assessment.report.view import view_axes
-from cms.body.error_estimates import ErrorEstimates
+from cms.body.error_estimates import MESH_SIGNS, ErrorEstimates
 from cms.body.reduced_body import ReducedBody
 from cms.jobs.acceptance.acceptance import VERDICT_WORDS, Acceptance
 from cms.jobs.acceptance.origin import origin_groups
@@ -188,9 +188,11 @@ def errors_table(body: ReducedBody, errors: ErrorEstimates) -> TextTable:
     """Return the errors of the free frequencies by the reduction and by the mesh that the file has on record."""
 
     def percent(values: Array, k: int, sign: str) -> str:
-        return f"{sign}{100 * values[k]:.2g}" if k < len(values) and np.isfinite(values[k]) else ""
+        if k >= len(values) or not np.isfinite(values[k]):
+            return ""
+        return f"{sign if values[k] > 0 else ''}{100 * values[k]:.2g}"
 
-    sign = "+" if errors.mesh_sign == "+" else "±"
+    sign = MESH_SIGNS.get(errors.mesh_sign, "")
     frequencies = in_hertz(body, body.free_frequencies)
     rows = tuple(
         (str(k + 1), f"{frequencies[k]:.6g}", percent(errors.frequency, k, "+") + " ?" * bool(errors.is_uncertain[k]),
