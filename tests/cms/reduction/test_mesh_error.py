@@ -8,7 +8,8 @@ from numpy.testing import assert_array_equal
 
 import cms
 import fe_models as fm
-from cms.cli.info import MESH_SIGNS, error_percent
+from cms.body.error_estimates import MESH_SIGNS
+from cms.cli.info import error_percent
 from cms.modes.families.families import Families
 from cms.modes.mode_sets import MODE_SETS
 from cms.reduction.basis.free_basis import free_basis
