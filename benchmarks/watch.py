@@ -47,6 +47,7 @@ class Results:
     figures: dict[str, dict[str, float]]  #: of each module
     seconds: dict[str, float]  #: each module took, by the clock
     failed: dict[str, str] = field(default_factory=dict)  #: last line of what a module said
+    renewed: list[str] = field(default_factory=list)  #: modules of this run, if the others are of earlier runs
 
     @classmethod
     def read(cls, path: Path) -> "Results | None":
@@ -205,6 +206,7 @@ def page(now: Results, last: Results | None) -> str:
         HEAD,
         f"Now: {now.date}, commit `{now.commit}`, {machine}, {lasted}.",
         f"Last: {last.date}, commit `{last.commit}`, load {last.load:.1f}." if last else "There was no run before.",
+        *([f"Of this run: {', '.join(now.renewed)}; the others are of earlier runs."] if now.renewed else []),
         "Libraries: " + ", ".join(f"{name} {now.machine[name]}" for name in ("Python", *PACKAGES)) + ".",
         "",
         *aims_table(now, AIMS),
