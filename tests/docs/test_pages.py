@@ -10,7 +10,8 @@ from tests.root import ROOT
 DOCS = ROOT / "docs"
 KINDS = ("learn", "howto", "lookup", "explanation", "evidence")
 #: most words of the pages of a kind that are written by hand, code included
-MOST_WORDS = {"learn": 15_050, "howto": 27_500, "lookup": 16_500, "explanation": 25_500, "evidence": 48_700}
+MOST_WORDS = {"learn": 15_050, "howto": 27_500, "lookup": 16_500, "explanation": 25_500, "evidence": 45_500}
+MADE = {"figures"}  #: pages that a command writes
 PAGES = sorted(path for path in DOCS.glob("*.md") if path.stem not in {"index", *KINDS})
 #: anchors that any page may name without its file
 LABELS = {name for path in PAGES for name in re.findall(r"^\(([\w-]+)\)=$", path.read_text(), re.MULTILINE)}
@@ -39,7 +40,8 @@ def test_every_page_belongs_to_one_kind():
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_pages_of_a_kind_keep_their_size(kind):
-    words = sum(len((DOCS / f"{page}.md").read_text().split()) for page in members(kind) if "/" not in page)
+    pages = [page for page in members(kind) if "/" not in page and page not in MADE]
+    words = sum(len((DOCS / f"{page}.md").read_text().split()) for page in pages)
     assert 0 < words <= MOST_WORDS[kind]
 
 
