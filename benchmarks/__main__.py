@@ -101,8 +101,8 @@ def main() -> int:
             print(f"\n{module}: {watch.title(module)}")
         print(f"  {each.name:72s} {watch.shown(each.now):>9s}  last {watch.shown(each.last):>9s}  {each.words}")
     if asked.names and last:  # the others stay as they were
-        renewed = list(now.figures)
-        now = replace(now, figures=last.figures | now.figures, seconds=last.seconds | now.seconds, renewed=renewed)
+        figures = last.figures | {name: last.figures.get(name, {}) | own for name, own in now.figures.items()}
+        now = replace(now, figures=figures, seconds=last.seconds | now.seconds, renewed=list(now.figures))
     if asked.keep:
         now.write(watch.RESULTS)
         watch.PAGE.write_text(watch.page(now, last))

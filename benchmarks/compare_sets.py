@@ -11,14 +11,13 @@ before and after, since machines drift. Seconds of the clock, and of the process
 once and kept in benchmarks/out.
 """
 
-import json
 import resource
-import subprocess
 import sys
 import time
 
 import numpy as np
 
+from benchmarks.records import print_record, record_of
 from benchmarks.rods import rod_file
 
 SIZE = 2.56  # element size [mm]
@@ -74,9 +73,7 @@ def main():
     for size in sizes:
         records = {}
         for what in ("single", "six", "single"):
-            command = [sys.executable, "-m", "benchmarks.compare_sets", what, str(size)]
-            out = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout
-            records.setdefault(what, []).append(json.loads(out[out.index("RECORD ") + 7 :].splitlines()[0]))
+            records.setdefault(what, []).append(record_of("compare_sets", what, size))
         (six,), singles = records["six"], records["single"]
         clock, cpu = (np.mean([r[key] for r in singles]) for key in ("s", "cpu"))
         single = " and ".join(f"{r['s']:.1f} [{r['cpu']:.1f}]" for r in singles)
@@ -93,6 +90,6 @@ if __name__ == "__main__":
     if sys.argv[1:] and sys.argv[1] in ("single", "six"):
         record = run(SETS[:1] if sys.argv[1] == "single" else SETS, float(sys.argv[2]))
         record["GB"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-        print("RECORD " + json.dumps(record))
+        print_record(record)
     else:
         main()

@@ -10,9 +10,7 @@ Memory: peak of the process above what it held before. "cpu": seconds of process
 the same time: on a busy machine it says more than the clock. Both must find the same fixed-interface frequencies.
 """
 
-import json
 import resource
-import subprocess
 import sys
 import tempfile
 import time
@@ -20,6 +18,8 @@ from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
+
+from benchmarks.records import print_record, record_of
 
 N_MODES = 14
 BARS = {"48k": (160, 9, 9), "149k": (220, 14, 14)}
@@ -99,19 +99,14 @@ def measure(side, folder):
         "GB": (after - before) / 1e6,
         "Hz": [float(f) for f in frequencies],
     }
-    print("RECORD " + json.dumps(record))
+    print_record(record)
 
 
 def both(name):
     """Return the records of both sides, ours first, and the number of dofs."""
     with tempfile.TemporaryDirectory() as folder:
         n_dof = make(BARS[name], Path(folder))
-        record = {}
-        for side in ("own", "exudyn"):
-            command = [sys.executable, "-m", "benchmarks.craig_bampton_vs_exudyn", side, folder]
-            out = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-            record[side] = json.loads(out[out.index("RECORD ") + 7 :].splitlines()[0])
-    ours, theirs = record["own"], record["exudyn"]
+        ours, theirs = (record_of("craig_bampton_vs_exudyn", side, folder) for side in ("own", "exudyn"))
     np.testing.assert_allclose(ours["Hz"], sorted(theirs["Hz"])[:N_MODES], rtol=1e-6)
     return ours, theirs, n_dof
 

@@ -12,7 +12,6 @@ checks included. Memory: peak of the process above what it held before. Both mus
 """
 
 import argparse
-import json
 import resource
 import subprocess
 import sys
@@ -23,6 +22,7 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 
+from benchmarks.records import print_record, record_of
 from benchmarks.rods import OUT
 
 N_MODES = 8
@@ -109,14 +109,12 @@ def measure(side, folder):
     frequencies = run()
     seconds, cpu = time.perf_counter() - start, time.process_time() - cpu
     GB = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1e6
-    print("RECORD " + json.dumps({"s": seconds, "cpu": cpu, "GB": GB, "Hz": [float(f) for f in frequencies]}))
+    print_record({"s": seconds, "cpu": cpu, "GB": GB, "Hz": [float(f) for f in frequencies]})
 
 
 def record(side, folder):
     """Return the record of one side, run in a process of its own."""
-    command = [sys.executable, "-m", "benchmarks.exudyn_hinge", "--side", side, folder]
-    out = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout
-    return json.loads(out[out.index("RECORD ") + 7 :].splitlines()[0])
+    return record_of("exudyn_hinge", "--side", side, folder)
 
 
 def words(each):

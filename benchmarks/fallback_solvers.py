@@ -5,14 +5,13 @@ python -m benchmarks.fallback_solvers small    # 33 882
 python -m benchmarks.fallback_solvers blocks 0.5 cholesky   # all processors, 16 blocks of 16 columns: as block Lanczos
 """
 
-import json
 import os
 import resource
-import subprocess
 import sys
 import time
 from pathlib import Path
 
+from benchmarks.records import print_record, record_of
 from benchmarks.rods import rod_file
 
 SIZES = {"small": 5.0, "large": 2.5}  #: element size [mm]
@@ -96,9 +95,7 @@ def blocks(million, name):
 
 def measured(name, path):
     environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    command = [sys.executable, "-m", "benchmarks.fallback_solvers", "one", name, str(path)]
-    out = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True, env=environment).stdout
-    return json.loads(out[out.index("RECORD ") + 7 :].splitlines()[0])
+    return record_of("fallback_solvers", "one", name, path, env=environment)
 
 
 def figures(short):
@@ -131,6 +128,6 @@ if __name__ == "__main__":
         from fe_models.foundation.threads import bounded_threads
 
         with bounded_threads(1):
-            print("RECORD " + json.dumps(one(*sys.argv[2:])))
+            print_record(one(*sys.argv[2:]))
     else:
         main()

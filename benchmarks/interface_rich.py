@@ -14,7 +14,6 @@ counted. Every run is a process of its own, with one thread of BLAS each, so tha
 counts no waiting threads; the ratio is of processor times. With columns on disk: `benchmarks.memory_forecast`.
 """
 
-import json
 import os
 import subprocess
 import sys
@@ -23,6 +22,8 @@ import time
 from pathlib import Path
 
 import numpy as np
+
+from benchmarks.records import print_record, record_in
 
 OUT = Path(__file__).parent / "out"
 SIZES = {  # cells along x, y, z and where single top faces are interfaces: numbers of cells along x and y
@@ -163,7 +164,7 @@ def figures(short):
     """Return what the watch keeps."""
     size, name = ("small", "reduced") if short else ("full", "plain")
     mesh_file(size)
-    solver = json.loads(measured(["-m", "benchmarks.interface_rich", "bare", size])["output"].partition("RECORD ")[2])
+    solver = record_in(measured(["-m", "benchmarks.interface_rich", "bare", size])["output"])
     made = command(size, name)
     return {
         f"cms reduce over the bare solver, {solver['n_b']} boundary dofs, {name}": made["cpu"] / solver["cpu"],
@@ -192,7 +193,7 @@ def main():
     made = measured(["-m", "benchmarks.interface_rich", "bare", size])
     if made["code"]:
         sys.exit(made["output"])
-    solver = json.loads(made["output"].partition("RECORD ")[2])
+    solver = record_in(made["output"])
     print(
         f"{solver['n_dof']} dofs, {solver['n_b']} of them on interfaces; bare: cpu {solver['cpu']:.1f} s (factor "
         f"{solver['factor']:.1f}, {solver['n_b']} columns {solver['solve']:.1f})",
@@ -209,7 +210,7 @@ def main():
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["bare"]:
-        print("RECORD " + json.dumps(bare(sys.argv[2])))
+        print_record(bare(sys.argv[2]))
     elif sys.argv[1:] == ["error"]:
         error()
     else:

@@ -11,15 +11,14 @@ that get their memory page by page from a host the first touch of a gigabyte can
 Meshes are made by gmsh once and kept in benchmarks/out.
 """
 
-import json
 import resource
-import subprocess
 import sys
 import time
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.records import print_record, record_of
 from benchmarks.rods import OUT, rod_file
 
 SIZES = {"0.1": 3.0, "0.25": 2.05, "0.5": 1.62, "1.0": 1.24}  # million dofs -> element size [mm]
@@ -103,9 +102,7 @@ def measured(million):
     path = mesh_file(million)
     record = {}
     for what in ("bare", "line", "bare"):
-        command = [sys.executable, "-m", "benchmarks.large_solid", what, str(path)]
-        out = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout
-        record.setdefault(what, []).append(json.loads(out[out.index("RECORD ") + 7 :].splitlines()[0]))
+        record.setdefault(what, []).append(record_of("large_solid", what, path))
     return record["line"][0], record["bare"]
 
 
@@ -141,6 +138,6 @@ if __name__ == "__main__":
     if sys.argv[1:] and sys.argv[1] in ("line", "bare"):
         record = {"line": line, "bare": bare}[sys.argv[1]](Path(sys.argv[2]))
         record["GB"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-        print("RECORD " + json.dumps(record))
+        print_record(record)
     else:
         main()

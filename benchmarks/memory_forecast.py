@@ -10,7 +10,6 @@ Connecting rods of `benchmarks.large_solid`, tet10, two rigid interfaces, 50 mod
 "peak" is the largest resident size of the process; each stage has its own beside its forecast.
 """
 
-import json
 import logging
 import os
 import subprocess
@@ -19,6 +18,7 @@ import tempfile
 import threading
 from pathlib import Path
 
+from benchmarks.records import print_record, record_in
 from benchmarks.rods import OUT, rod_file
 
 RODS = {"50k": 3.76, "160k": 2.44, "300k": 1.91, "475k": 1.62}  #: element size [mm]
@@ -115,7 +115,7 @@ def measured(name, budget=AMPLE, threads=1):
         said = output.read()
     if child.returncode:
         raise RuntimeError(said[-1500:])
-    record = json.loads(said.partition("RECORD ")[2].splitlines()[0])
+    record = record_in(said)
     record["peak"] = usage.ru_maxrss * 1024
     record["cpu"] = usage.ru_utime + usage.ru_stime
     record["threads"] = threads
@@ -156,6 +156,6 @@ def main():
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["run"]:
-        print("RECORD " + json.dumps(run(*sys.argv[2:])))
+        print_record(run(*sys.argv[2:]))
     else:
         main()

@@ -11,13 +11,13 @@ peaks of memory are their own, of the whole process. The shell is a curved panel
 edges, the solid a cube between two rigid faces. The error: multilevel frequencies against the direct ones.
 """
 
-import json
 import resource
-import subprocess
 import sys
 import time
 
 import numpy as np
+
+from benchmarks.records import print_record, record_of
 
 TOLERANCE = 1e-3
 STUDY = [("shell", 128, 300), ("shell", 208, 300), ("shell", 208, 1000), ("solid", 16, 100), ("solid", 28, 100)]
@@ -83,9 +83,7 @@ def measured(kind, n, n_modes):
     """Return the records of both ways, and the largest relative error of a frequency."""
     records = []
     for what in ("multilevel", "direct"):
-        command = [sys.executable, "-m", "benchmarks.multilevel", "run", what, kind, str(n), str(n_modes)]
-        out = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout
-        records.append(json.loads(out[out.index("RECORD ") + 7 :].splitlines()[0]))
+        records.append(record_of("multilevel", "run", what, kind, n, n_modes))
     one, two = records
     return one, two, np.max(np.array(one["frequencies"]) / np.array(two["frequencies"]) - 1)
 
@@ -148,6 +146,6 @@ def main():
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["run"]:
-        print("RECORD " + json.dumps(run(*sys.argv[2:4], *map(int, sys.argv[4:6]))))
+        print_record(run(*sys.argv[2:4], *map(int, sys.argv[4:6])))
     else:
         main()

@@ -9,7 +9,6 @@ every stage, its time and the peak of resident memory of each rank in it, and on
 stages, what MUMPS took, entries of the factor and floating-point operations there.
 """
 
-import json
 import os
 import resource
 import subprocess
@@ -21,6 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.large_solid import N_MODES, OUT, mesh_file, solid
+from benchmarks.records import print_record, record_in
 
 MPIRUN = ["mpirun", "--oversubscribe", "--bind-to", "none"]
 SETTINGS = {
@@ -119,7 +119,7 @@ def figures(short):
     for n in (1, 2):
         command = [*MPIRUN, "-n", str(n), sys.executable, "-m", "benchmarks.petsc_ranks", million]
         done = subprocess.run(command, env=os.environ | SETTINGS, capture_output=True, text=True, check=True)
-        found[n] = json.loads(done.stdout.partition("RECORD ")[2].splitlines()[0])
+        found[n] = record_in(done.stdout)
     one, two = found[1], found[2]
     return {
         f"largest peak of two ranks over the peak of one, {million} M dofs": max(two["GB"]) / one["GB"][0],
@@ -150,7 +150,7 @@ def main():
             f"{ended[rank][1] - begun[rank][1]:.0f} s of processor",
         )
     record = {"GB": list(stages.peaks()), "s": sum(seconds for _, seconds, _ in stages.rows)}
-    print("RECORD " + json.dumps(record), flush=True)
+    print_record(record)
     ranks.end()
 
 

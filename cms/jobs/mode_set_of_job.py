@@ -51,7 +51,7 @@ def job_mode_set(body: FEBody | Families, reduction: ReductionSection) -> ModeSe
         added = partial(with_additions, families, reduction)
         make, n_modes = partial(MODE_SETS[reduction.set], families), reduction.n_modes
         n_beyond = reduction.beyond or 0 if reduction.set in (*INTERFACE_SETS, "normal") else 0
-        if n_beyond and isinstance(n_modes, int):  # first, so that the modes of the set are a part of these
+        if n_beyond and isinstance(n_modes, int):  # the families keep them, and the set takes its own
             make(**{**options, "n_modes": min(n_modes + n_beyond, max(n_modes, most_modes(body)))})
         if n_modes != AUTO:
             modes = added(make(**options))

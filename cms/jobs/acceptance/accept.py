@@ -106,7 +106,6 @@ def accept(
     if full.job is not None:
         job = read_job(Path(full.job), full.changes)
         records, compared = against_job(job, Path(full.job), reduced, own, band, stages)
-        records = with_default_band(records) if band is None else records
         if job.body.deck is not None:
             left_out = cards_left_out(parse_deck(job.body.deck))
     elif full.deck is not None:
@@ -115,14 +114,12 @@ def accept(
         with stages("full model"):
             body = body_of_deck(deck, full, reduced)
         records = (*own, *compare_with_model(body, reduced, band=band or band_of(reduced)))
-        records = with_default_band(records) if band is None else records
         compared = f"the deck {full.deck}, {body.n_dof} dofs, its supports removed"
     elif (deck_path := reduced.provenance.get("deck")) and Path(deck_path).is_file():
         left_out = cards_left_out(parse_deck(Path(deck_path)))
     if left_out is not None:
         records = (*records, left_out_record(left_out))
-    if band is not None:
-        records = (*records, band_record(reduced, records, band))
+    records = with_default_band(records) if band is None else (*records, band_record(reduced, records, band))
     error = with_estimate_of_file(mesh_error(job, most_dofs, stages), reduced)
     if error.estimate is not None:
         records = (*records, judge("mesh-error", error.largest, error.words, {"error": error.estimate.error}))

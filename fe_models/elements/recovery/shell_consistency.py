@@ -176,21 +176,11 @@ def surface_fields(at: Patches, x: Array, y: Array, along: Array | None = None) 
     axes = np.stack([e_x, np.cross(n, e_x)], axis=2)
     F = axes @ np.swapaxes(dual, 2, 3)  # from covariant components to the axes
     f, g = F[..., 0], F[..., 1]
-    rows = [(0, 0, 1.0), (1, 1, 1.0), (0, 1, 2.0)]
-    tensor = np.stack(
-        [
-            np.stack(
-                [
-                    q * f[..., a] * f[..., b],
-                    q * g[..., a] * g[..., b],
-                    q * (f[..., a] * g[..., b] + f[..., b] * g[..., a]),
-                ],
-                2,
-            )
-            for a, b, q in rows
-        ],
-        axis=2,
-    )
+    rows = [
+        np.stack([f[..., a] * f[..., b], g[..., a] * g[..., b], f[..., a] * g[..., b] + f[..., b] * g[..., a]], axis=2)
+        for a, b in ((0, 0), (1, 1), (0, 1))
+    ]
+    tensor = np.stack(rows, axis=2) * np.array([1.0, 1.0, 2.0])[:, None]  # eps_x, eps_y, gamma_xy of eps_11, _22, _12
     motion = np.zeros((*x.shape, 3, 3 * N_TERMS))
     for a, own in enumerate(np.split(motion, 3, axis=3)):
         own[:, :, a] = u(0, 0)
@@ -272,9 +262,8 @@ def patch_planes(groups: list[Cells], near: Neighbours) -> Patches:
         own = np.flatnonzero((near.middle >= part.first) & (near.middle < part.first + len(part.X)))
         middle, group = near.middle[own] - part.first, part.group
         R[own], origin[own] = group.planes.R[middle], part.X[middle].mean(axis=1)
-        laws = [(law.A, law.bending, np.linalg.inv(law.H)) for law in group.laws]
-        for values, of_law in zip((A, D, flexibility), zip(*laws, strict=True), strict=True):
-            values[own] = np.array(of_law)[group.law[middle]]
+        A[own], D[own] = group.by_law(lambda law: law.A, middle), group.by_law(lambda law: law.bending, middle)
+        flexibility[own] = group.by_law(lambda law: np.linalg.inv(law.H), middle)
     whole = Patches(R, origin, np.ones(n), np.zeros((n, 1)), A, D, flexibility)
     size, surface = np.empty(n), np.empty((n, (SURFACE_DEGREE + 1) * (SURFACE_DEGREE + 2) // 2))
     for rows in chunks(n):
@@ -471,13 +460,12 @@ def add_edge_layers(
         place = np.stack([(1 - points) / 2, (1 + points) / 2], axis=1) @ nodes
         along = np.einsum("nab,na->nb", at.R, group.planes.R[cell][:, :, 0])
         strain = surface_fields(at, place[..., 0], place[..., 1], along).strain @ c[:, None]
-        stiffness = np.array([law.stiffness for law in group.laws])[group.law[cell]]
-        twist = np.stack(
-            [x * y, -x * y, y**2 - x**2], axis=1
-        )  # of the components of M, and of kappa for kappa_ns = 1/2
+        stiffness = group.by_law(lambda law: law.stiffness, cell)
+        # weights of M_x, M_y, M_xy in M_ns, which are also kappa_x, kappa_y, kappa_xy for kappa_ns = 1/2
+        twist = np.stack([x * y, -x * y, y**2 - x**2], axis=1)
         T = np.einsum("ns,npsk->npk", twist, stiffness[:, None, 3:6] @ strain)
-        g = np.einsum("ni,nij,nj->n", twist, np.array([law.bending for law in group.laws])[group.law[cell]], twist)
-        H = np.array([np.linalg.inv(law.H) for law in group.laws])[group.law[cell]]
+        g = np.einsum("ni,nij,nj->n", twist, group.by_law(lambda law: law.bending, cell), twist)
+        H = group.by_law(lambda law: np.linalg.inv(law.H), cell)
         t = np.stack([x, y], axis=1)
         k = np.sqrt(1 / (np.einsum("ni,nij,nj->n", t, H, t) * g))
         np.add.at(error, cells[rows], ((length / (2 * g * k))[:, None, None] * w[:, None] * T**2).sum(axis=1))

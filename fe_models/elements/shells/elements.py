@@ -125,7 +125,7 @@ class ShellCells:
         """Thickness, (n,) [m]."""
         return self.by_law(lambda law: law.thickness, slice(None))
 
-    def by_law(self, value: Callable[[ShellLaw], Any], rows: slice) -> Array:
+    def by_law(self, value: Callable[[ShellLaw], Any], rows: slice | IntArray) -> Array:
         """Evaluate a function of the law for each of the given cells, (n, ...)."""
         return np.array([value(law) for law in self.laws], dtype=float)[self.law[rows]]
 

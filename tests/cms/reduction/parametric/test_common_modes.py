@@ -12,34 +12,21 @@ from cms.reduction import parametric_body, reduce_family
 from cms.reduction.parametric.common_modes import in_common_modes
 from cms.reduction.parametric.interpolation_errors import flexibility, relative
 from cms.reduction.recovery.load_columns import forces_of_loads
+from tests.cms.reduction.parametric.bar import BAR, THICKNESSES, N, write_job
 
-WIDTH, N = 0.02, 8
 N_MODES = 5
-THICKNESSES = (0.012, 0.017, 0.024)  #: bending in both planes crosses at 0.02, below the cutoff and at it
 N_STATIC = 12  #: constraint and inertia-relief modes without rigid-body motion
-JOB = """
+JOB = (
+    """
 [parameters]
 thickness = 0.01
 [body]
 nodes = "nodes.csv"
 lines = "lines.csv"
 units = "m-kg-s"
-[materials.steel]
-young = 210e9
-poisson = 0.3
-density = 7850
-[sections.bar]
-shape = "rectangle"
-width = 0.02
-height = "{thickness}"
-lines = "bar"
-[interfaces.root]
-kind = "rigid"
-nodes = "root"
-[interfaces.tip]
-kind = "rigid"
-nodes = "tip"
-[load_cases.push]
+"""
+    + BAR
+    + """[load_cases.push]
 kind = "force"
 force = [30.0, -20.0, 10.0]
 nodes = "middle"
@@ -56,6 +43,7 @@ rows = [{quantity = "displacement", at = ["middle"]}, {quantity = "beam force", 
 [damping]
 ratio = 0.02
 """
+)
 
 
 @pytest.fixture(scope="module")
@@ -63,12 +51,7 @@ def job(tmp_path_factory):
     """A bent bar far from the origin, in a nodal frame with other axes: bending, torsion and stretch are coupled."""
     folder, x = tmp_path_factory.mktemp("bent"), np.linspace(0, 1, N + 1)
     nodes = np.stack([5 + x, 0.2 * x - 3 + 0.1 * x**2, 2 - 0.3 * x], axis=1)
-    sets = {0: "root", 3: "middle", N: "tip"}
-    rows = "".join(f"{k},{x},{y},{z},{sets.get(k, '')}\n" for k, (x, y, z) in enumerate(nodes))
-    (folder / "nodes.csv").write_text("node,x,y,z,sets\n" + rows)
-    (folder / "lines.csv").write_text("node1,node2,group\n" + "".join(f"{k},{k + 1},bar\n" for k in range(N)))
-    (folder / "bent.toml").write_text(JOB)
-    return folder / "bent.toml"
+    return write_job(folder, nodes, JOB, {3: "middle"})
 
 
 def reduced(job, thickness, **changes):
@@ -98,9 +81,8 @@ def recovered(body):
     table = body.recovery["gauges"]
     q = np.linalg.solve(body.K, forces_of_loads(body, table.loads)[6:])
     D_0, D_2 = table.dynamic[0][:, 6:], table.dynamic[2][:, 6:]
-    shapes = q[
-        :, [not name.startswith(("load case", "spin")) for name in table.loads]
-    ]  # static shapes in the span of the set
+    is_static = [not name.startswith(("load case", "spin")) for name in table.loads]
+    shapes = q[:, is_static]  # in the span of the set
     return D_0 @ q + table.static, D_2 @ shapes - D_0 @ np.linalg.solve(body.K, shapes)
 
 

@@ -18,12 +18,11 @@ from cms.reduction.parametric.family_file import KIND
 from cms.reduction.parametric.interpolation_errors import errors_between
 from fe_models.meshes.numbering import Numbering
 from tests.cms.command import assert_refused, run_cms
+from tests.cms.reduction.parametric.bar import BAR, THICKNESSES, N, write_job
 
 LENGTHS = (1.0, 1.2)
-THICKNESSES = (0.012, 0.017, 0.024)  #: bending in both planes crosses at the width
-WIDTH = 0.02
-N = 8  #: elements
-JOB = """
+JOB = (
+    """
 [parameters]
 length = 1.0
 thickness = 0.01
@@ -32,22 +31,9 @@ nodes = "nodes.csv"
 lines = "lines.csv"
 scale = ["{length}", 1, 1]
 units = "m-kg-s"
-[materials.steel]
-young = 210e9
-poisson = 0.3
-density = 7850
-[sections.bar]
-shape = "rectangle"
-width = 0.02
-height = "{thickness}"
-lines = "bar"
-[interfaces.root]
-kind = "rigid"
-nodes = "root"
-[interfaces.tip]
-kind = "rigid"
-nodes = "tip"
-[reduction]
+"""
+    + BAR
+    + """[reduction]
 set = "craig-bampton-ir"
 n_modes = 4
 frame = "nodal"
@@ -58,22 +44,13 @@ error_estimates = false
 [damping]
 ratio = 0.01
 """
+)
 
 
 @pytest.fixture(scope="module")
 def job(tmp_path_factory):
     x = np.linspace(0, 1, N + 1)
     return write_job(tmp_path_factory.mktemp("cantilever"), np.stack([x, 0 * x, 0 * x], axis=1), JOB)
-
-
-def write_job(folder, nodes, text):
-    """Write a job of a bar through these nodes; return its path."""
-    sets = {0: "root", N: "tip"}
-    rows = "".join(f"{k},{x},{y},{z},{sets.get(k, '')}\n" for k, (x, y, z) in enumerate(nodes))
-    (folder / "nodes.csv").write_text("node,x,y,z,sets\n" + rows)
-    (folder / "lines.csv").write_text("node1,node2,group\n" + "".join(f"{k},{k + 1},bar\n" for k in range(N)))
-    (folder / "cantilever.toml").write_text(text)
-    return folder / "cantilever.toml"
 
 
 @pytest.fixture(scope="module")
