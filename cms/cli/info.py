@@ -123,7 +123,8 @@ def print_body(body: "ReducedBody", *, everything: bool = False, has_warned: boo
             ],
         )
     if everything:
-        print_table("Provenance", ("", ""), list(record["provenance"].items()))
+        width = max(map(len, record["provenance"]), default=0)
+        say("\n".join(("Provenance", *(f"{key:<{width}}  {words}" for key, words in record["provenance"].items()))))
 
 
 def print_free_frequencies(record: Any) -> None:

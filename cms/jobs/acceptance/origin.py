@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from cms.reduction.basis.damping import for_readers
 from fe_models.foundation.paths import file_digest
 
 __all__ = ["GROUPS", "SourceFile", "origin_groups", "source_files"]
@@ -30,7 +31,7 @@ def origin_groups(provenance: Mapping[str, str]) -> dict[str, dict[str, str]]:
     groups: dict[str, dict[str, str]] = {title: {} for title in GROUPS}
     for key, words in provenance.items():
         title = next(title for title, starts in GROUPS.items() if key.startswith(starts))
-        groups[title][key] = words
+        groups[title][key] = for_readers(words) if key == "damping" else words
     return {title: rows for title, rows in reversed(groups.items()) if rows}
 
 

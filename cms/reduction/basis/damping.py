@@ -27,6 +27,7 @@ __all__ = [
     "RampDamping",
     "RayleighDamping",
     "damping_of_words",
+    "for_readers",
     "heavy_words",
     "modal_damping",
     "stated_damping",
@@ -150,6 +151,28 @@ def damping_of_words(words: str) -> Damping | None:
     except (SyntaxError, KeyError, TypeError, ValueError):
         return None
     return made
+
+
+def for_readers(words: str) -> str:
+    """Return a sentence for the text of a damping in the provenance; an unknown text is returned as it is."""
+    match damping_of_words(words):
+        case ModalDamping(ratio):
+            return f"{percent(ratio)} of critical in every mode"
+        case PerModeDamping((ratio,)):
+            return f"{percent(ratio)} of critical in every mode"
+        case PerModeDamping(ratios):
+            return f"{', '.join(percent(each) for each in ratios)} of critical by mode, the last for all further modes"
+        case RampDamping(steps, above):
+            below = ", ".join(f"{percent(ratio)} below {frequency:g} Hz" for frequency, ratio in steps)
+            return f"{below}, {percent(above)} above, of critical"
+        case RayleighDamping(alpha, beta):
+            return f"alpha M + beta K with alpha = {alpha:g}, beta = {beta:g}"
+    return words
+
+
+def percent(ratio: float) -> str:
+    """Return a ratio as percentage."""
+    return f"{100 * ratio:.4g} %"
 
 
 def stated_damping(body: ReducedBody) -> Damping | None:

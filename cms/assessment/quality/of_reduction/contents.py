@@ -30,7 +30,7 @@ from cms.errors import CmsError
 from cms.modes.families.families import Families
 from cms.modes.families.rigid_modes import rounding_of_energy
 from cms.modes.mode_set import ModeSet
-from cms.reduction.basis.damping import Damping, modal_damping, stated_damping
+from cms.reduction.basis.damping import Damping, for_readers, modal_damping, stated_damping
 from cms.reduction.basis.finishing import SUSPECT_ENERGY, FinishedBasis
 from cms.reduction.basis.frames import Frame, FrameCondition, HeldFrame, frame_condition
 from cms.reduction.basis.free_basis import FreeBasis
@@ -410,19 +410,21 @@ def wanted_damping(case: Case) -> tuple[Array | None, str]:
     reduced, options = case.reduced, case.options
     told = reduced.provenance.get("damping", "none")
     damping: Damping | StrainDamping | None = stated_damping(reduced)
-    words = f"provenance: {told}"
+    words = f"provenance: {for_readers(told)}"
     if CONVERTED in reduced.provenance:
         if options is None:
             return None, ""
         asked = str(options.damping) if options.damping else "none"
         if asked == told:
-            return carried_damping(case, options.damping, options.frame), f"the job: {asked}, transformed to this frame"
+            return carried_damping(
+                case, options.damping, options.frame
+            ), f"the job: {for_readers(asked)}, transformed to this frame"
         # the conversion replaced all damping by damping ratios of the new modes
         return None if damping is None or isinstance(damping, StrainDamping) else modal_damping(
             damping, reduced.M, reduced.K, second=reduced.units.time
         ), words
     if options is not None:
-        damping, words = options.damping, f"the job: {options.damping or 'none'}"
+        damping, words = options.damping, f"the job: {for_readers(str(options.damping or 'none'))}"
     elif damping is None and told != "none":
         return None, ""
     return reduced_damping(case.body, case.finished, damping), words

@@ -207,7 +207,7 @@ def test_a_body_that_is_not_that_of_its_job_is_not_accepted_by_name(folder, caps
     found = accept(bad, FullModel(job=folder / "bar.toml"), most_dofs=0)
     assert {record.name for record in found.records if record.verdict == "fail"} == {"damping-matrix", "stress-modes"}
     (damping,) = (record for record in found.records if record.name == "damping-matrix")
-    assert "the job: ModalDamping(ratio=0.01)" in damping.reason
+    assert "the job: 1 % of critical in every mode" in damping.reason
     write(bad, folder / "bad.h5")
     assert check_file(folder / "bad.h5", folder / "bar.toml", band=None, as_json=True, changes={}) == 1
     records = json.loads(capsys.readouterr().out)["records"]

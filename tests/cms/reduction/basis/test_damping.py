@@ -14,6 +14,7 @@ from cms.reduction.basis.damping import (
     RampDamping,
     RayleighDamping,
     damping_of_words,
+    for_readers,
     modal_damping,
     stated_damping,
 )
@@ -29,6 +30,22 @@ K = np.diag((2 * np.pi * HERTZ) ** 2)
 
 def ratios_of(D, K):
     return np.diag(D) / (2 * np.sqrt(np.diag(K)))
+
+
+@pytest.mark.parametrize(
+    ("damping", "sentence"),
+    [
+        (ModalDamping(0.015), "1.5 % of critical in every mode"),
+        (PerModeDamping((0.5,), heavy=True), "50 % of critical in every mode"),
+        (PerModeDamping((0.01, 0.02)), "1 %, 2 % of critical by mode, the last for all further modes"),
+        (RampDamping(((60.0, 0.02),), above=0.5), "2 % below 60 Hz, 50 % above, of critical"),
+        (RayleighDamping(3.0, 1e-6), "alpha M + beta K with alpha = 3, beta = 1e-06"),
+        ("strain patterns 0123 (4, beta = 1e-06)", "strain patterns 0123 (4, beta = 1e-06)"),
+        ("none", "none"),
+    ],
+)
+def test_readers_get_a_sentence(damping, sentence):
+    assert for_readers(str(damping)) == sentence
 
 
 def test_the_ramp_steps_at_its_frequencies():
