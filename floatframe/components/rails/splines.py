@@ -6,7 +6,15 @@ from scipy.linalg import solve_banded
 
 from fe_models.foundation.arrays import Array
 
-__all__ = ["basis", "basis_slopes", "cell", "coefficients", "even_coefficients"]
+__all__ = [
+    "basis",
+    "basis_curvatures",
+    "basis_slopes",
+    "cell",
+    "cell_slope",
+    "coefficients",
+    "even_coefficients",
+]
 
 
 def even_coefficients(values: Array, axis: int = 0) -> Array:
@@ -51,6 +59,13 @@ def cell(x, start, step, n):
 
 
 @numba.njit(cache=True)
+def cell_slope(x, start, step, n):
+    """Return the derivative of the position t in `cell` by x, which is zero beyond the ends."""
+    place = (x - start) / step
+    return 1 / step if 0.0 < place < n - 1 else 0.0
+
+
+@numba.njit(cache=True)
 def basis(t):
     """Return the four weights of the coefficients i, i + 1, i + 2, i + 3 at t."""
     s = 1 - t
@@ -62,3 +77,10 @@ def basis_slopes(t):
     """Return the derivatives of `basis` by t."""
     s = 1 - t
     return -s * s / 2, (3 * t * t - 4 * t) / 2, -(3 * s * s - 4 * s) / 2, t * t / 2
+
+
+@numba.njit(cache=True)
+def basis_curvatures(t):
+    """Return the second derivatives of `basis` by t."""
+    s = 1 - t
+    return s, 3 * t - 2, 3 * s - 2, t

@@ -133,6 +133,7 @@ def law_of_wheels(element: Wheelset | WheelOnRail, placed: Placed, wheels: tuple
         WHEEL_OUTPUTS,
         wheels_on_rails,
     )
+    from floatframe.components.rails.tangent import tangent_of_wheels
 
     where = f"element {element.name!r}"
     if placed.units.name != "m-kg-s":
@@ -157,7 +158,7 @@ def law_of_wheels(element: Wheelset | WheelOnRail, placed: Placed, wheels: tuple
         holds=[POSITION] * len(sides),
         outputs=names,
         output_units=units,
-        tangent="complex",
+        tangent=tangent_of_wheels,
         length=1e-3,  # shifts of a millimetre change the contact
         time=math.inf,
         energy="energy",

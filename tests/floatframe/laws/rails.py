@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation
 from floatframe.components import rails
 from floatframe.components.rails.assembly import grid_of, shift_off_the_rail
 from floatframe.components.rails.contact_table import FIELDS, Steel, contact_table
-from floatframe.components.rails.law import HEAD, LIFTED, WHEEL_HEAD, Creepage, Patch, fastsim, polach
+from floatframe.components.rails.creep import Creepage, Patch, fastsim, polach
+from floatframe.components.rails.law import HEAD, LIFTED, WHEEL_HEAD
 from tests.floatframe.element_laws import marker_motion
 from tests.floatframe.laws.form import A, Form, State
 

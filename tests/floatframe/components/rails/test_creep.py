@@ -4,17 +4,19 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe.components.rails.kalker import asymptotes, kalker_coefficients
-from floatframe.components.rails.law import (
+from floatframe.components.rails.assembly import CREEP_LAWS
+from floatframe.components.rails.creep import (
     Creepage,
     Patch,
     creep_force,
+    creep_slopes,
     fastsim,
     fastsim_of_flexibilities,
     linear_creep,
     polach,
     saturated_creep,
 )
+from floatframe.components.rails.kalker import asymptotes, kalker_coefficients
 from floatframe.errors import ModelError
 
 A, B, N, G, MU = 8e-3, 4e-3, 8.2e4, 8.2e10, 0.3  #: the example of FASTSIM that comes with CONTACT
@@ -158,6 +160,27 @@ def test_steps_along_the_imaginary_axis_give_the_derivatives(number):
         by_differences = (law(at + step) - law(at - step)) / (2 * step[k])
         exact = law(at + 1e-25j * (step > 0)).imag / 1e-25
         assert_allclose(exact, by_differences, rtol=1e-5, atol=1e-6 * np.abs(by_differences).max())
+
+
+@pytest.mark.parametrize("law", sorted(CREEP_LAWS))
+def test_derivatives_are_those_of_imaginary_steps(law):
+    """From creepages at which nearly all of the contact sticks to those at which all of it slides."""
+    number = CREEP_LAWS[law]
+    options = np.array([0.8, 0.6, 0.5, 0.3, 0.0]) if law == "polach" else np.array([12.0, 9.0, 0.0, 0.0, 0.0])
+    rng = np.random.default_rng(4)
+    for size in np.geomspace(1e-5, 1e-1, 60):
+        at = np.array([*size * rng.normal(size=3) * [1, 1, 100], N, *rng.uniform(2e-3, 9e-3, 2), *STEEL, 20.0])
+        patch = Patch(*at[3:10], G, MU)
+        found, wanted = np.zeros((3, 11)), np.zeros((3, 11))
+        creep_slopes(number, Creepage(*at[:3]), patch, options, at[10], found)
+        for k in range(11):
+            y = at.astype(complex)
+            y[k] += 1e-30j
+            wanted[:, k] = (
+                np.imag(creep_force(number, Creepage(*y[:3]), Patch(*y[3:10], G, MU), options, y[10])) / 1e-30
+            )
+        sizes = np.abs(wanted * at).max(axis=1, keepdims=True)  # of the change of each force with relative changes
+        assert (np.abs(found - wanted) * np.abs(at) <= 1e-11 * sizes).all()
 
 
 def test_friction_does_not_give_energy():

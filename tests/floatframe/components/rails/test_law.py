@@ -11,6 +11,7 @@ from floatframe.components.rails.assembly import ContactLaws, Wheel, law_numbers
 from floatframe.components.rails.contact_search import rigid_contacts
 from floatframe.components.rails.irregularities import Irregularities
 from floatframe.components.rails.law import CONTACT_OUTPUTS, WHEEL_OUTPUTS, wheels_on_rails
+from floatframe.components.rails.tangent import tangent_of_wheels
 from floatframe.components.rails.track import Track, curve
 from floatframe.engine.compiling.callbacks.law_functions import callback, called_law
 from floatframe.model.rotations import rotation_exp
@@ -28,28 +29,30 @@ def wheels_of(pair):
 class Law:
     """The law of a wheelset as the engine compiles it, called with the motion of its axle."""
 
-    def __init__(self, pair=CONE, track=None, **laws):
+    def __init__(self, pair=CONE, track=None, spin_inertia=0.0, **laws):
         self.wheels = wheels_of(pair)
-        self.data = law_numbers(self.wheels, track or Track(), ContactLaws(**laws))
+        self.data = law_numbers(self.wheels, track or Track(), ContactLaws(**laws), spin_inertia)
         self.names = output_names(self.wheels, WHEEL_OUTPUTS, CONTACT_OUTPUTS)[0]
         self.n_lam = 2 if laws.get("normal") == "constraint" else 0
-        self.head = (1, 18, 0, self.n_lam, len(self.names), len(self.data), 1, 0)
+        self.n_z = 1 if spin_inertia else 0
+        self.head = (1, 18, self.n_z, self.n_lam, len(self.names), len(self.data), 1, 0)
 
-    def outputs(self, kind, motion, n_out):
-        r, A, v, omega, *lam = motion
-        inputs = np.concatenate([[0.0], r, np.ravel(A), v, omega, *lam])
-        function = callback("wheels", wheels_on_rails, kind, self.head)
+    def outputs(self, function, kind, motion, n_out):
+        r, A, v, omega, *unknowns = motion
+        inputs = np.concatenate([[0.0], r, np.ravel(A), v, omega, *unknowns])
+        function = callback("wheels", function, kind, self.head)
         return called_law(function.address, self.head, self.data, inputs[None], n_out)[0]
 
     def __call__(self, *motion):
-        """Return wrench, what is held and what is seen."""
-        n_out = 6 + self.n_lam
-        return np.split(self.outputs("value", motion, n_out + len(self.names)), [6, n_out])
+        """Return wrench, with the rate of the spin, what is held and what is seen."""
+        n_out = 6 + self.n_z + self.n_lam
+        values = self.outputs(wheels_on_rails, "value", motion, n_out + len(self.names))
+        return np.split(values, [6 + self.n_z, n_out])
 
-    def slopes(self, *motion):
-        """Return the derivatives of wrench and what is held, by dr, dphi, dv, domega and multipliers."""
-        n_out, n_columns = 6 + self.n_lam, 12 + self.n_lam
-        return self.outputs("complex", motion, n_out * n_columns).reshape(n_out, n_columns)
+    def slopes(self, *motion, function=tangent_of_wheels, kind="given"):
+        """Return the derivatives of wrench, rate and what is held, by dr, dphi, dv, domega, spin and multipliers."""
+        n_out, n_columns = 6 + self.n_z + self.n_lam, 12 + self.n_z + self.n_lam
+        return self.outputs(function, kind, motion, n_out * n_columns).reshape(n_out, n_columns)
 
     def seen(self, *motion):
         return dict(zip(self.names, self(*motion)[2], strict=True))
@@ -147,7 +150,7 @@ def test_left_and_right_are_mirror_images(creep):
 
 
 @pytest.mark.parametrize(("creep", "normal"), [("fastsim", "hertz"), ("polach", "constraint"), ("kalker", "hertz")])
-def test_the_tangent_by_imaginary_steps_is_that_of_differences(creep, normal):
+def test_the_tangent_is_that_of_differences(creep, normal):
     """In a transition curve with irregular rails, with flange contact on the left."""
     s = np.arange(0, 60.5, 0.5)
     rng = np.random.default_rng(2)
@@ -184,6 +187,56 @@ def test_the_tangent_by_imaginary_steps_is_that_of_differences(creep, normal):
             column[:6], by_differences[:6], rtol=2e-4, atol=max(1e-4 * np.abs(column[:6]).max(), 1e-6 * scale)
         )
         assert_allclose(column[6:], by_differences[6:], rtol=0, atol=1e-6)  # metres of gap per metre or radian
+
+
+@pytest.mark.parametrize(
+    ("creep", "normal", "inertia"),
+    [
+        ("fastsim", "hertz", 112.0),
+        ("fastsim", "constraint", 0.0),
+        ("polach", "constraint", 60.0),
+        ("kalker-saturated", "hertz", 0.0),
+        ("kalker", "constraint", 112.0),
+    ],
+)
+def test_the_tangent_is_that_of_imaginary_steps(creep, normal, inertia):
+    """Anywhere on a curved, canted, irregular track, forward and backward, with and without contact of each part."""
+    s = np.arange(0, 100.5, 0.5)
+    rng = np.random.default_rng(2)
+    track = Track(
+        curve(300.0, 30.0, transition=24.0, cant=0.1, before=10.0, after=20.0),
+        Irregularities(s, *(1e-3 * rng.normal(size=(4, len(s))))),
+        start=(3.0, -2.0, 0.7),
+        heading=0.6,
+    )
+    laws = {"creep": creep, "normal": normal, "damping": 1e-3, "low_speed": 0.2, "polach": (0.8, 0.6, 0.5, 0.3)}
+    law = Law(NEW, track, inertia, **laws)
+    contacts = set()
+    for _ in range(40):
+        frame, V = track.frame(rng.uniform(2, 95)), rng.uniform(-20, 20)
+        Q, spin = frame.axes, V / 0.46 * rng.uniform(0.98, 1.02)
+        y = rng.uniform(-9e-3, 9e-3)
+        z = 0.4597 + 1e-4 * rng.uniform(-3, 1) + (1e-3 * rng.uniform(0, 1.5) if abs(y) > 5e-3 else 0.0)
+        turn = tilted(rng.normal(size=3) * [3e-3, 0, 8e-3]) @ tilted([0, rng.uniform(-3, 3), 0])
+        motion = [
+            frame.origin + Q @ [0, y, z],
+            Q @ turn,
+            Q @ [V, *0.05 * rng.normal(size=2)],
+            Q @ [0.05 * rng.normal(), spin, 0.05 * rng.normal()],
+            np.full(law.n_z, 1.01 * spin),
+            rng.uniform(-2e4, 9e4, law.n_lam),
+        ]
+        wanted = law.slopes(*motion, function=wheels_on_rails, kind="complex")
+        sizes = np.abs(wanted).max(axis=1, keepdims=True)
+        if inertia:  # the rate of the spin is a moment about the axle divided by the inertia
+            sizes[6] = sizes[3:6].max() / inertia
+        of_columns = np.maximum(np.abs(wanted / np.maximum(sizes, 1e-30)).max(axis=0), 1e-9)
+        assert (np.abs(law.slopes(*motion) - wanted) <= 1e-10 * sizes * of_columns).all()
+        names = [f"{side}_{part}_N" for side in ("left", "right") for part in ("tread", "flange")]
+        seen = law.seen(*motion)
+        contacts.add(tuple(np.sign(seen[name]) for name in names))
+    assert {1} < {each[0] for each in contacts}
+    assert {1} < {each[3] for each in contacts}
 
 
 def test_elastic_forces_at_rest_are_the_slope_of_the_stored_energy():
