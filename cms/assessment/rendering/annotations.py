@@ -177,8 +177,11 @@ def draw_axes(draw: Any, origin: Any, arms: Array, depth: Array, u: int, names: 
 @lru_cache(maxsize=16)
 def font(size: int, *, is_bold: bool = False) -> Any:
     """Return matplotlib's own DejaVu Sans, so that pictures look the same on every machine."""
-    import matplotlib
+    from importlib.util import find_spec
+
     from PIL import ImageFont
 
     name = "DejaVuSans-Bold.ttf" if is_bold else "DejaVuSans.ttf"
-    return ImageFont.truetype(str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / name), size)
+    where = find_spec("matplotlib")  # not imported: that takes a third of a second
+    assert where is not None  # the package requires it
+    return ImageFont.truetype(str(Path(str(where.origin)).parent / "mpl-data" / "fonts" / "ttf" / name), size)

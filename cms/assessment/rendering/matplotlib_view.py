@@ -4,15 +4,16 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from cms.assessment.rendering.camera import Camera
 from cms.assessment.rendering.film import Image, average_of_blocks
 from cms.assessment.rendering.light import lit
 from cms.assessment.rendering.scene import Lines, Scene, Surface, frame_of
-from cms.assessment.rendering.shape import colormap, smooth_neighbours, surface_edges, triangle_normals
-from fe_models.foundation.arrays import Array
+from cms.assessment.rendering.shape import FEATURE_ANGLE, colormap, rgb_of, surface_edges, triangle_normals
+from fe_models.foundation.arrays import Array, IntArray
 
-__all__ = ["matplotlib_view"]
+__all__ = ["matplotlib_view", "smooth_neighbours"]
 
 #: size of the drawing before averaging divided by the final size; smoothing by matplotlib would show seams of faces
 OVERSAMPLING = 2
@@ -22,7 +23,6 @@ def matplotlib_view(scene: Scene, camera: Camera) -> Callable[[int], Image]:
     """Return a function that draws a frame as (height, width, 3) uint8."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.collections import LineCollection, PolyCollection
-    from matplotlib.colors import to_rgb
     from matplotlib.figure import Figure
 
     width, height = camera.size
@@ -36,7 +36,7 @@ def matplotlib_view(scene: Scene, camera: Camera) -> Callable[[int], Image]:
         axes.clear()
         axes.set(xlim=(0, width), ylim=(height, 0))
         axes.axis("off")
-        figure.set_facecolor(to_rgb(scene.background))
+        figure.set_facecolor(rgb_of(scene.background))
         for lines in scene.lines:
             if lines.is_backdrop:
                 axes.add_collection(line_collection(LineCollection, lines, camera, frame))
@@ -62,7 +62,6 @@ class DrawnSurface:
     """Surface with data that all frames share: sharp edges, and smoothing of faces."""
 
     def __init__(self, surface: Surface, scene: Scene) -> None:
-        from matplotlib.colors import to_rgb
 
         self.surface = surface
         rest = surface.nodes_at(0)
@@ -71,7 +70,7 @@ class DrawnSurface:
         # the inside of a closed surface is never visible
         self.is_closed = bool((self.beside[:, 0] != self.beside[:, 1]).all())
         self.limits = scene.color_limits if surface.scalars is not None else (0.0, 1.0)
-        self.color = np.array(to_rgb(surface.color))
+        self.color = np.array(rgb_of(surface.color))
 
     def polygons(self, camera: Camera, frame: int) -> tuple[Array, Array, Array, Array, Array]:
         """Return depth (n,), corners (n, 3, 2), face and edge colours (n, 4), edge widths (n,) of all faces and edges.
@@ -124,3 +123,18 @@ def line_collection(kind: Any, lines: Lines, camera: Camera, frame: int) -> Any:
     seen = camera.project(lines.points_at(frame))[lines.segments]
     seen = seen[(seen[..., 2] > 0).all(axis=1)]
     return kind(seen[..., :2], colors=lines.color, linewidths=OVERSAMPLING * lines.width * 0.72, alpha=lines.opacity)
+
+
+def smooth_neighbours(nodes: Array, triangles: IntArray) -> sp.csr_array:
+    """Return the matrix that sums, for each triangle, area normals of neighbours at less than the feature angle.
+
+    It is (n_triangles, n_triangles), with entries 0 and 1, and includes the triangle itself.
+    """
+    n = len(triangles)
+    corner = sp.csr_array((np.ones(3 * n), (np.repeat(np.arange(n), 3), triangles.ravel())), shape=(n, len(nodes)))
+    touch = sp.coo_array(corner @ corner.T)
+    normals = triangle_normals(nodes, triangles)
+    rows, columns = touch.row, touch.col
+    near = np.einsum("ea,ea->e", normals[rows], normals[columns]) > np.cos(FEATURE_ANGLE)
+    near |= rows == columns
+    return sp.csr_array((np.ones(near.sum()), (rows[near], columns[near])), shape=(n, n))

@@ -1,4 +1,4 @@
-"""Drawing of scenes to files by pyvista in a separate process or, if that fails, by matplotlib, with a note."""
+"""Drawing of scenes to files by VTK in a separate process or, if that fails, by matplotlib, with a note."""
 
 import logging
 import os
@@ -36,8 +36,8 @@ class Drawing:
     """Picture or film in a file, and the library that drew it."""
 
     path: Path
-    backend: str  #: "pyvista" or "matplotlib"
-    note: str = ""  #: reason why pyvista was not used; empty if it was used
+    backend: str  #: "vtk" or "matplotlib"
+    note: str = ""  #: reason why VTK was not used; empty if it was used
 
 
 def render_picture(scene: Scene, path: str | Path) -> Drawing:
@@ -104,15 +104,15 @@ def drawn(
             out = Path(folder) / target.name
             reason = run_worker(scene, Path(folder) / "scene.npz", out, options, tell)
             if reason:
-                log.warning("%s: pyvista could not draw it (%s); drawn with matplotlib instead", target, reason)
+                log.warning("%s: VTK could not draw it (%s); drawn with matplotlib instead", target, reason)
                 fallback(out)
             os.replace(out, target)
     except OSError as error:
         raise RenderError(
             f"{target}: cannot be written ({error.strerror or error}); check the folder and its space"
         ) from error
-    note = f"drawn with matplotlib, since pyvista could not ({reason})" if reason else ""
-    return Drawing(target, "matplotlib" if reason else "pyvista", note)
+    note = f"drawn with matplotlib, since VTK could not ({reason})" if reason else ""
+    return Drawing(target, "matplotlib" if reason else "vtk", note)
 
 
 def run_worker(scene: Scene, scene_path: Path, out: Path, options: tuple[str, ...], tell: OnFrame) -> str:

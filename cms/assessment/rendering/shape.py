@@ -1,14 +1,13 @@
-"""Geometry of a surface for drawing: sharp edges, and normals smoothed between them."""
+"""Surfaces for drawing: normals, sharp edges, colours."""
 
 from functools import lru_cache
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array, IntArray
 
-__all__ = ["colormap", "smooth_neighbours", "surface_edges", "triangle_normals"]
+__all__ = ["colormap", "rgb_of", "surface_edges", "triangle_normals"]
 
 FEATURE_ANGLE = np.deg2rad(35.0)  #: angle between normals above which an edge is sharp
 COLOR_STOPS = ("#3b6fb6", "#4fa3c7", "#8fcfb0", "#e6e28a", "#f2a65a", "#d6513f", "#9b1d3c")
@@ -47,27 +46,20 @@ def surface_edges(nodes: Array, triangles: IntArray) -> tuple[IntArray, IntArray
     return ends[start], beside, (count != 2) | (angle_cos < np.cos(FEATURE_ANGLE))
 
 
-def smooth_neighbours(nodes: Array, triangles: IntArray) -> sp.csr_array:
-    """Return the matrix that sums, for each triangle, area normals of neighbours at less than the feature angle.
+def rgb_of(color: str) -> tuple[float, float, float]:
+    """Return red, green and blue from 0 to 1 of a colour such as "#4fa3c7"."""
+    from PIL.ImageColor import getrgb
 
-    It is (n_triangles, n_triangles), with entries 0 and 1, and includes the triangle itself.
-    """
-    n = len(triangles)
-    corner = sp.csr_array((np.ones(3 * n), (np.repeat(np.arange(n), 3), triangles.ravel())), shape=(n, len(nodes)))
-    touch = sp.coo_array(corner @ corner.T)
-    normals = triangle_normals(nodes, triangles)
-    rows, columns = touch.row, touch.col
-    near = np.einsum("ea,ea->e", normals[rows], normals[columns]) > np.cos(FEATURE_ANGLE)
-    near |= rows == columns
-    return sp.csr_array((np.ones(near.sum()), (rows[near], columns[near])), shape=(n, n))
+    red, green, blue = getrgb(color)[:3]
+    return red / 255, green / 255, blue / 255
 
 
 @lru_cache(maxsize=1)
 def colormap() -> Array:
     """Return the colour map, (256, 3) from 0 to 1: cool to warm, with equal perceived differences (CIE76)."""
-    from matplotlib.colors import LinearSegmentedColormap
-
-    fine = LinearSegmentedColormap.from_list("", COLOR_STOPS)(np.linspace(0, 1, 2048))[:, :3]
+    stops = np.array([rgb_of(color) for color in COLOR_STOPS])
+    at = np.linspace(0, len(stops) - 1, 256)
+    fine = np.stack([np.interp(at, np.arange(len(stops)), stops[:, k]) for k in range(3)], axis=1)
     steps = np.linalg.norm(np.diff(cie_lab(fine), axis=0), axis=1)
     travelled = np.r_[0.0, np.cumsum(steps)]
     wanted = np.linspace(0, travelled[-1], 256)

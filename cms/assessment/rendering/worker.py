@@ -1,4 +1,4 @@
-"""The drawing process with pyvista: `python -m cms.assessment.rendering.worker scene.npz out.png [fps]`.
+"""The drawing process with VTK: `python -m cms.assessment.rendering.worker scene.npz out.png [fps]`.
 
 It is a separate process, because VTK ends its process if there is no OpenGL. It prints one line per frame, which tells
 `cms.assessment.rendering.render` that it is alive.
@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 
 from cms.assessment.rendering.drawing import draw_animation, draw_picture
-from cms.assessment.rendering.pyvista_view import pyvista_view
 from cms.assessment.rendering.scene_file import read_scene
+from cms.assessment.rendering.vtk_view import vtk_view
 
 __all__ = ["main"]
 
@@ -19,9 +19,9 @@ def main(scene_path: str, out: str, fps: str = "") -> None:
     leave_no_core_file()
     scene = read_scene(Path(scene_path))
     if fps:
-        draw_animation(scene, Path(out), pyvista_view, fps=float(fps), on_frame=report)
+        draw_animation(scene, Path(out), vtk_view, fps=float(fps), on_frame=report)
     else:
-        draw_picture(scene, Path(out), pyvista_view)
+        draw_picture(scene, Path(out), vtk_view)
 
 
 def leave_no_core_file() -> None:

@@ -27,9 +27,9 @@ from cms.assessment.rendering.annotations import drop_below, layout_of, round_ti
 from cms.assessment.rendering.camera import FILL, fitted_camera
 from cms.assessment.rendering.drawing import draw_picture
 from cms.assessment.rendering.film import average_of_blocks, write_film
-from cms.assessment.rendering.matplotlib_view import matplotlib_view
+from cms.assessment.rendering.matplotlib_view import matplotlib_view, smooth_neighbours
 from cms.assessment.rendering.scene_file import read_scene, write_scene
-from cms.assessment.rendering.shape import cie_lab, colormap, smooth_neighbours, surface_edges
+from cms.assessment.rendering.shape import cie_lab, colormap, surface_edges
 from cms.assessment.report import view
 from cms.assessment.report.view import animate_mode, mode_scene, view_axes, view_mode
 from cms.errors import BodyError, CmsError
@@ -91,12 +91,12 @@ def dying_worker(monkeypatch):
     monkeypatch.setattr(render, "WORKER", DIES)
 
 
-def drawn_by_pyvista(scene, path):
-    """Draw with pyvista; skip visibly where a machine has no OpenGL, fail where everything is required."""
+def drawn_by_vtk(scene, path):
+    """Draw with VTK; skip visibly where a machine has no OpenGL, fail where everything is required."""
     drawing = render_picture(scene, path)
-    if drawing.backend != "pyvista":
+    if drawing.backend != "vtk":
         if os.environ.get("FLOATFRAME_REQUIRE_ALL") == "1":
-            pytest.fail(f"pyvista is required here: {drawing.note}")
+            pytest.fail(f"VTK is required here: {drawing.note}")
         pytest.skip(drawing.note)
     return read_image(path)
 
@@ -118,7 +118,7 @@ def test_both_backends_cover_the_same_pixels_with_nearly_the_same_colours(shows_
     nodes, triangles = sphere()
     scene = Scene(surfaces=(Surface(triangles, nodes, scalars=nodes[:, 2] if shows_numbers else None),),
                   size=(480, 360), direction=np.array([-1.0, 0.4, -0.3]))  # fmt: skip
-    one = drawn_by_pyvista(scene, tmp_path / "pyvista.png")
+    one = drawn_by_vtk(scene, tmp_path / "vtk.png")
     draw_picture(scene, tmp_path / "matplotlib.png", matplotlib_view)
     other = read_image(tmp_path / "matplotlib.png")
     seen_one, seen_other = covered(one, scene), covered(other, scene)
@@ -265,12 +265,12 @@ def test_an_mp4_has_all_frames(dying_worker, tmp_path):
     assert_allclose(seconds, 0.5, rtol=0.05, atol=0)
 
 
-def test_pyvista_draws_the_frames_of_a_film(tmp_path):
+def test_vtk_draws_the_frames_of_a_film(tmp_path):
     from PIL import Image
 
     seen = []
     drawing = render_animation(moving_scene(3), tmp_path / "a.gif", on_frame=lambda *n: seen.append(n))
-    if drawing.backend == "pyvista":
+    if drawing.backend == "vtk":
         assert seen == [(1, 3), (2, 3), (3, 3)]
     with Image.open(drawing.path) as gif:
         frames = []
