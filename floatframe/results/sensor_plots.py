@@ -33,6 +33,7 @@ LONG_LEGEND = 6  #: number of entries above which a legend has two columns
 MOST_BARS = 40  #: largest number of bars of a unit
 MOST_PANELS = 8  #: largest number of panels on a page
 LEGEND_GAP = 0.03  #: gap between curves and a legend above them, as a share of the height of a panel
+LIKELY = 1.1  #: ratio of the sizes of panels before and after the layout of a page, at most
 MOST_LEGEND = 0.5  #: largest share of the height of a panel that is kept free for a legend
 
 
@@ -185,31 +186,47 @@ def pages_of(panels: "Sequence[Callable[[Axes], Axes]]", *, title: str = "") -> 
     for number, page in enumerate(pages, start=1):
         n_columns = 1 if len(panels) == 1 else 2
         n_rows = (len(page) + n_columns - 1) // n_columns
-        figure = Figure(figsize=(6.5 * n_columns, 3.4 * n_rows + 0.6), layout="constrained")
+        figure = Figure(figsize=(6.5 * n_columns, 3.4 * n_rows + 0.6))
         words = [title, f"page {number} of {len(pages)}" if len(pages) > 1 else ""]
         if any(words):
             figure.suptitle(", ".join(word for word in words if word))
+        figure.subplots_adjust(**likely_places(figure, n_rows, n_columns))
         axes = figure.subplots(n_rows, n_columns, squeeze=False).ravel()
         for panel, ax in zip(page, axes, strict=False):
             panel(ax)
         for ax in axes[len(page) :]:
             ax.remove()
         free_legends(figure)
+        figure.set_layout_engine("constrained")
         figures.append(figure)
     return figures
 
 
+def likely_places(figure: "Figure", n_rows: int, n_columns: int) -> dict[str, float]:
+    """Return the places of panels that leave as much room for labels as the layout will, within a tenth.
+
+    The layout itself takes as long as the drawing of a page.
+    """
+    width, height = figure.get_size_inches()
+    left, right, below, above, title = 0.75, 0.1, 0.45, 0.2, 0.35  # [in]
+    across = (width - n_columns * (left + right)) / n_columns
+    high = (height - title - n_rows * (below + above)) / n_rows
+    return {
+        "left": left / width, "right": 1 - right / width, "wspace": (left + right) / across,
+        "bottom": below / height, "top": 1 - (above + title) / height, "hspace": (below + above) / high,
+    }  # fmt: skip
+
+
 def free_legends(figure: "Figure") -> None:
-    """Make room above the curves of a finished figure for those legends that cover a curve, on linear axes."""
-    figure.draw_without_rendering()
+    """Make room above the curves for those legends that cover a curve, on linear axes."""
     for ax in figure.axes:
         legend = ax.get_legend()
         if legend is None or ax.get_yscale() != "linear":
             continue
-        box = legend.get_window_extent()
+        bottom, top = ax.get_ylim()  # this scales the axes to their curves, which the next lines need
+        box = legend.get_window_extent().expanded(LIKELY, LIKELY)
         if any(box.count_contains(line.get_transform().transform(line.get_xydata())) for line in ax.get_lines()):
             share = min(box.height / ax.get_window_extent().height + LEGEND_GAP, MOST_LEGEND)
-            bottom, top = ax.get_ylim()
             ax.set_ylim(bottom, bottom + (top - bottom) / (1 - share))
             legend.set_loc("upper right")
 

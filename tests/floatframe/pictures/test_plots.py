@@ -7,11 +7,11 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
 from floatframe import GeneralizedAlpha, integrate
 from floatframe.pictures import plots
-from floatframe.results.sensor_plots import free_legends
+from floatframe.results.sensor_plots import LIKELY, pages_of
 from floatframe.results.trajectory import Trajectory
 from tests.floatframe.results.examples import SYSTEM
 
@@ -74,15 +74,33 @@ def test_the_drift_of_many_joints_is_not_hidden_under_its_legend(motion, monkeyp
 
 def test_no_legend_of_an_overview_covers_a_curve():
     """Without the room above, the legend of a motion that fills its panel covers it."""
-    figure = Figure(layout="constrained")
-    ax = figure.add_subplot()
     t = np.linspace(0.0, 1.0, 2000)
-    for k in range(5):
-        ax.plot(t, np.sin(200 * t + k), label=f"curve {k}")
-    ax.legend()
-    assert covered(figure) == [ax]
-    free_legends(figure)
-    assert covered(figure) == []
+
+    def fill(ax):
+        for k in range(5):
+            ax.plot(t, np.sin(200 * t + k), label=f"curve {k}")
+        ax.set(xlabel="time", ylabel="value")
+        ax.legend()
+        return ax
+
+    alone = fill(Figure(layout="constrained").add_subplot())
+    assert covered(alone.figure) == [alone]
+    for n_panels in (1, 3, 8):
+        (page,) = pages_of([fill] * n_panels, title="a title")
+        assert len(page.axes) == n_panels
+        assert covered(page) == []
+
+
+def test_the_layout_of_a_page_hardly_changes_the_sizes_of_its_panels():
+    for n_panels, words in ((1, ""), (2, "panel"), (3, ""), (8, "two\nlines")):
+        (page,) = pages_of(
+            [lambda ax, w=words: ax.set(xlabel="time", ylabel="value", title=w)] * n_panels, title="a title"
+        )
+        before = [ax.get_window_extent().frozen() for ax in page.axes]
+        page.draw_without_rendering()
+        for old, ax in zip(before, page.axes, strict=True):
+            new = ax.get_window_extent()
+            assert_allclose([new.width / old.width, new.height / old.height], 1, rtol=0, atol=LIKELY - 1)
 
 
 def covered(figure):
