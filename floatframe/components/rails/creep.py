@@ -137,34 +137,36 @@ def fastsim_of_flexibilities(creepage, patch, flexibilities, cells):
     gx, gx_v = xi / L1 * a, phi * b / L3 * a
     gy, gy_u = eta / L2 * a, phi * a / L3 * a
     dv = 2.0 / m_y
-    for j in range(m_y):
+    # the strips at v and -v together, because the processor can compute their tractions in parallel
+    for j in range((m_y + 1) // 2):
         v = -1 + (j + 0.5) * dv
         edge = np.sqrt(1 - v * v)
         du = 2 * edge / m_x
-        tx = 0 * fx
-        ty = 0 * fx
-        sx = 0 * fx
-        sy = 0 * fx
-        sm = 0 * fx
+        tx, ty, sx, sy, su = 0 * fx, 0 * fx, 0 * fx, 0 * fx, 0 * fx
+        tx_2, ty_2, sx_2, sy_2, su_2 = tx, tx, tx, tx, tx
         for i in range(m_x):
             u = edge - (i + 0.5) * du
             step = du if i > 0 else 0.5 * du
-            middle = u + 0.5 * step
-            tx = tx - (gx - gx_v * v) * step
-            ty = ty - (gy + gy_u * middle) * step
+            dt_y = (gy + gy_u * (u + 0.5 * step)) * step
+            tx, ty = tx - (gx - gx_v * v) * step, ty - dt_y
+            tx_2, ty_2 = tx_2 - (gx + gx_v * v) * step, ty_2 - dt_y
             bound = bound_0 * (1 - u * u - v * v)
-            t2 = tx * tx + ty * ty
-            if t2.real > (bound * bound).real:
-                cut = bound / np.sqrt(t2)
-                tx = tx * cut
-                ty = ty * cut
-            sx = sx + tx
-            sy = sy + ty
-            sm = sm + a * u * ty - b * v * tx
+            limit = (bound * bound).real
+            square, square_2 = tx * tx + ty * ty, tx_2 * tx_2 + ty_2 * ty_2
+            if square.real > limit:
+                cut = bound / np.sqrt(square)
+                tx, ty = tx * cut, ty * cut
+            if square_2.real > limit:
+                cut = bound / np.sqrt(square_2)
+                tx_2, ty_2 = tx_2 * cut, ty_2 * cut
+            sx, sy, su = sx + tx, sy + ty, su + u * ty
+            sx_2, sy_2, su_2 = sx_2 + tx_2, sy_2 + ty_2, su_2 + u * ty_2
         cell = a * b * du * dv
-        fx = fx + sx * cell
-        fy = fy + sy * cell
-        m = m + sm * cell
+        if 2 * j + 1 == m_y:  # the strip in the middle is alone
+            sx_2, sy_2, su_2 = 0 * sx, 0 * sy, 0 * su
+        fx = fx + (sx + sx_2) * cell
+        fy = fy + (sy + sy_2) * cell
+        m = m + (a * (su + su_2) - b * v * (sx - sx_2)) * cell
     return fx, fy, m
 
 
@@ -197,10 +199,9 @@ def creep_force(law, creepage, patch, options, V):
 
 @numba.njit(cache=True)
 def creep_slopes(law, creepage, patch, options, V, slopes):
-    """Write the derivatives of `creep_force` by xi, eta, phi, N, a, b, c11, c22, c23, c33, V into slopes, (3, 11)."""
+    """Return `creep_force`; write its derivatives by xi, eta, phi, N, a, b, c11 to c33, V to slopes, (3, 11)."""
     if law == 3:
-        fastsim_slopes(creepage, patch, options, slopes)
-        return
+        return fastsim_slopes(creepage, patch, options, slopes)
     (xi, eta, phi), (N, a, b, c11, c22, c23, c33, G, mu) = creepage, patch
     at = np.empty(N_CREEP_INPUTS, np.complex128)
     for k in range(N_CREEP_INPUTS):
@@ -210,11 +211,12 @@ def creep_slopes(law, creepage, patch, options, V, slopes):
         moved, around = Creepage(at[0], at[1], at[2]), Patch(at[3], at[4], at[5], at[6], at[7], at[8], at[9], G, mu)
         fx, fy, m = creep_force(law, moved, around, options, at[10])
         slopes[0, k], slopes[1, k], slopes[2, k] = fx.imag / TINY, fy.imag / TINY, m.imag / TINY
+    return fx.real, fy.real, m.real
 
 
 @numba.njit(cache=True)
 def fastsim_slopes(creepage, patch, options, slopes):
-    """Write the derivatives of `fastsim` into slopes, see `creep_slopes`.
+    """Return the forces of `fastsim`; write their derivatives to slopes, see `creep_slopes`.
 
     With the flexibilities of `fastsim`, the recursion has five inputs: g_x = (3/8) G C11 xi, g_y = (3/8) G C22 eta,
     k b and k a with k = (4/pi) G C23 phi sqrt(b/a), and the bound B = 2 mu N/(pi a b):
@@ -285,6 +287,7 @@ def fastsim_slopes(creepage, patch, options, slopes):
         slopes[r, 9], slopes[r, 10] = 0.0, 0.0
     slopes[2, 4] += m_a
     slopes[2, 5] -= m_b
+    return f[0, 0], f[0, 1], f[0, 2]
 
 
 @numba.njit(cache=True)

@@ -36,6 +36,7 @@ __all__ = [
     "contact_fields",
     "contact_of_part",
     "deviation",
+    "four_rows",
     "place_of_wheel",
     "spin_of_wheels",
     "vector_sum",
@@ -138,27 +139,30 @@ def deviation(data, signal, s):
 
 
 @numba.njit(cache=True)
-def contact_fields(data, table, part, v, roll, sine, field):
-    """Write the fields of one part at a shift v = u + r_0 roll, a sine of the roll and a sine of the yaw."""
+def contact_fields(data, table, v, roll, sine, field):
+    """Write the fields of all parts at a shift v = u + r_0 roll, a sine of the roll and a sine of the yaw."""
     n_v, n_r, n_y, n_f = int(data[table]), int(data[table + 3]), int(data[table + 6]), int(data[table + 8])
     if sine.real < 0:
         sine = -sine
     i, t = cell(v, data[table + 1], data[table + 2], n_v)
     j, q = cell(roll, data[table + 4], data[table + 5], n_r)
     k, e = cell(sine, 0.0, data[table + 7], n_y)
-    w_v, w_r, w_y = basis(t), basis(q), basis(e)
-    for f in range(N_FIELDS):
+    w_v, w_r, (y_0, y_1, y_2, y_3) = basis(t), basis(q), basis(e)
+    for f in range(n_f):
         field[f] = 0 * v
-    start = table + 9 + part * N_FIELDS
     for a in range(4):
         for b in range(4):
-            w_vr = w_v[a] * w_r[b]
-            at = start + (((i + a) * (n_r + 2) + j + b) * (n_y + 2) + k) * n_f
-            for c in range(4):
-                w = w_vr * w_y[c]
-                for f in range(N_FIELDS):
-                    field[f] += w * data[at + f]
-                at += n_f
+            w = w_v[a] * w_r[b]
+            at = table + 9 + (((i + a) * (n_r + 2) + j + b) * (n_y + 2) + k) * n_f
+            row_0, row_1, row_2, row_3 = four_rows(data, at, n_f)
+            for f in range(n_f):
+                field[f] += w * ((y_0 * row_0[f] + y_1 * row_1[f]) + (y_2 * row_2[f] + y_3 * row_3[f]))
+
+
+@numba.njit(cache=True)
+def four_rows(data, at, n):
+    """Return four rows of n numbers, one after the other, that begin at an index."""
+    return data[at : at + n], data[at + n : at + 2 * n], data[at + 2 * n : at + 3 * n], data[at + 3 * n : at + 4 * n]
 
 
 class Place(NamedTuple):
@@ -266,7 +270,7 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, outputs):
     inertia = data[20]
     spin = spin_of_wheels(z, inertia, omega, axle)
     zero = 0 * (r[0] + velocity[0] + (lam[0] if is_constraint else 0.0))
-    field = np.empty(N_FIELDS, dtype=x.dtype)
+    fields = np.empty((n_parts, N_FIELDS), dtype=x.dtype)
     energy = zero
     lost = zero
     worst = zero - 1.0
@@ -283,8 +287,9 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, outputs):
         Y = zero
         wear = zero
         lift = zero
+        contact_fields(data, table, place.v, place.roll, place.sine, fields.reshape(fields.size))
         for part in range(n_parts):
-            contact_fields(data, table, part, place.v, place.roll, place.sine, field)
+            field = fields[part]
             contact = contact_of_part(field, place, side, arm, axle)
             P, m, e, depth = contact.P, contact.m, contact.e, contact.depth
             slip = vector_sum(velocity, vector_product(spin, P))

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from floatframe.components.rails.creep import N_CREEP_INPUTS, Creepage, Patch, creep_force, creep_slopes
+from floatframe.components.rails.creep import N_CREEP_INPUTS, Creepage, Patch, creep_slopes
 from floatframe.components.rails.law import (
     N_FIELDS,
     N_HEAD,
@@ -19,6 +19,7 @@ from floatframe.components.rails.law import (
     combined,
     contact_fields,
     contact_of_part,
+    four_rows,
     place_of_wheel,
     spin_of_wheels,
     vector_sum,
@@ -71,32 +72,30 @@ def deviation_curvature(data, signal, s):
 
 
 @numba.njit(cache=True)
-def contact_field_slopes(data, table, part, v, roll, sine, slopes):
-    """Write the derivatives of `contact_fields` by shift, roll and sine of the yaw into slopes, (3, N_FIELDS)."""
+def contact_field_slopes(data, table, v, roll, sine, by_v, by_roll, by_sine):
+    """Write the derivatives of `contact_fields` by shift, roll and sine of the yaw."""
     n_v, n_r, n_y, n_f = int(data[table]), int(data[table + 3]), int(data[table + 6]), int(data[table + 8])
     sign = 1.0 if sine >= 0 else -1.0
     i, t = cell(v, data[table + 1], data[table + 2], n_v)
     j, q = cell(roll, data[table + 4], data[table + 5], n_r)
     k, e = cell(sign * sine, 0.0, data[table + 7], n_y)
-    by_v = cell_slope(v, data[table + 1], data[table + 2], n_v)
-    by_r = cell_slope(roll, data[table + 4], data[table + 5], n_r)
-    by_y = sign * cell_slope(sign * sine, 0.0, data[table + 7], n_y)
-    w_v, w_r, w_y = basis(t), basis(q), basis(e)
-    d_v, d_r, d_y = basis_slopes(t), basis_slopes(q), basis_slopes(e)
-    slopes[:, :] = 0.0
-    start = table + 9 + part * N_FIELDS
+    per_v = cell_slope(v, data[table + 1], data[table + 2], n_v)
+    per_r = cell_slope(roll, data[table + 4], data[table + 5], n_r)
+    per_y = sign * cell_slope(sign * sine, 0.0, data[table + 7], n_y)
+    w_v, w_r, (y_0, y_1, y_2, y_3) = basis(t), basis(q), basis(e)
+    d_v, d_r, (z_0, z_1, z_2, z_3) = basis_slopes(t), basis_slopes(q), basis_slopes(e)
+    by_v[:], by_roll[:], by_sine[:] = 0.0, 0.0, 0.0
     for a in range(4):
         for b in range(4):
-            w, of_v, of_r = w_v[a] * w_r[b], by_v * d_v[a] * w_r[b], by_r * w_v[a] * d_r[b]
-            at = start + (((i + a) * (n_r + 2) + j + b) * (n_y + 2) + k) * n_f
-            for c in range(4):
-                x, y, z = of_v * w_y[c], of_r * w_y[c], by_y * w * d_y[c]
-                for f in range(N_FIELDS):
-                    number = data[at + f]
-                    slopes[0, f] += x * number
-                    slopes[1, f] += y * number
-                    slopes[2, f] += z * number
-                at += n_f
+            x, y, z = per_v * d_v[a] * w_r[b], per_r * w_v[a] * d_r[b], per_y * w_v[a] * w_r[b]
+            at = table + 9 + (((i + a) * (n_r + 2) + j + b) * (n_y + 2) + k) * n_f
+            row_0, row_1, row_2, row_3 = four_rows(data, at, n_f)
+            for f in range(n_f):
+                value = (y_0 * row_0[f] + y_1 * row_1[f]) + (y_2 * row_2[f] + y_3 * row_3[f])
+                by_v[f] += x * value
+                by_roll[f] += y * value
+            for f in range(n_f):
+                by_sine[f] += z * ((z_0 * row_0[f] + z_1 * row_1[f]) + (z_2 * row_2[f] + z_3 * row_3[f]))
 
 
 class PlaceStep(NamedTuple):
@@ -186,7 +185,7 @@ def creep_slopes_of_contact(inputs, by_place, by_inputs, slopes):
         for p in range(3):
             total = 0.0
             for k in range(4, 10):
-                total += by_inputs[r, k] * inputs[k] * by_place[p, k + 3]
+                total += by_inputs[r, k] * inputs[k] * by_place[p][k + 3]
             slopes[r, 5 + p] = total
 
 
@@ -198,7 +197,9 @@ def tangent_of_wheels(t, x, z, lam, data, slopes):
     r, axle = (x[0, 0], x[0, 1], x[0, 2]), (x[0, 4], x[0, 7], x[0, 10])
     velocity, omega = (x[0, 12], x[0, 13], x[0, 14]), (x[0, 15], x[0, 16], x[0, 17])
     spin = spin_of_wheels(z, inertia, omega, axle)
-    field, by_place, fields = np.empty(N_FIELDS), np.empty((3, N_FIELDS)), np.empty(N_FIELDS)
+    n_parts = int(data[1])
+    all_fields, fields = np.empty((n_parts, N_FIELDS)), np.empty(N_FIELDS)  # values, and their change by a step
+    by_v, by_roll, by_sine = np.empty(all_fields.shape), np.empty(all_fields.shape), np.empty(all_fields.shape)
     inputs, by_inputs, of_creep = np.empty(N_CREEP_INPUTS), np.empty((3, N_CREEP_INPUTS)), np.zeros((3, 8))
     M = (0.0, 0.0, 0.0)  # moment of all wheels on the marker
     for wheel in range(int(data[0])):
@@ -208,9 +209,14 @@ def tangent_of_wheels(t, x, z, lam, data, slopes):
         speed = inner_product(velocity, place.t)
         ahead = 1.0 if speed >= 0 else -1.0
         V = np.sqrt(speed * speed + low_speed * low_speed)
-        for part in range(int(data[1])):
-            is_held = data[12] == 1.0 and part == 0
-            contact_fields(data, table, part, place.v, place.roll, place.sine, field)
+        contact_fields(data, table, place.v, place.roll, place.sine, all_fields.reshape(all_fields.size))
+        contact_field_slopes(
+            data, table, place.v, place.roll, place.sine,
+            by_v.reshape(by_v.size), by_roll.reshape(by_v.size), by_sine.reshape(by_v.size),
+        )  # fmt: skip
+        for part in range(n_parts):
+            is_held, field = data[12] == 1.0 and part == 0, all_fields[part]
+            by_place = by_v[part], by_roll[part], by_sine[part]
             contact = contact_of_part(field, place, side, arm, axle)
             if not is_held and contact.depth <= 0:
                 continue
@@ -226,7 +232,6 @@ def tangent_of_wheels(t, x, z, lam, data, slopes):
                 N = elastic * factor
                 if N <= 0:
                     continue
-            contact_field_slopes(data, table, part, place.v, place.roll, place.sine, by_place)
             # (5)
             xi, eta = inner_product(slip, place.t) / V, inner_product(slip, e) / V
             phi = inner_product(spin, m) / V
@@ -238,9 +243,8 @@ def tangent_of_wheels(t, x, z, lam, data, slopes):
                     inputs[k] = np.exp(field[k + 3])
                 creepage = Creepage(ahead * xi, ahead * eta, phi)
                 patch = Patch(N, inputs[4], inputs[5], inputs[6], inputs[7], inputs[8], inputs[9], G, mu)
-                fx, fy, moment = creep_force(law, creepage, patch, options, V)
+                fx, fy, moment = creep_slopes(law, creepage, patch, options, V, by_inputs)
                 fx, fy = ahead * fx, ahead * fy
-                creep_slopes(law, creepage, patch, options, V, by_inputs)
                 creep_slopes_of_contact(inputs, by_place, by_inputs, of_creep)
                 uphill = side * field[1] * place.along_y - place.along_z
             else:
@@ -252,7 +256,7 @@ def tangent_of_wheels(t, x, z, lam, data, slopes):
                 step = unit_step(axle, column, n_states)
                 moved = place_step(data, wheel, place, axle, step)
                 for f in range(N_FIELDS):
-                    fields[f] = by_place[0, f] * moved.v + by_place[1, f] * moved.roll + by_place[2, f] * moved.sine
+                    fields[f] = by_place[0][f] * moved.v + by_place[1][f] * moved.roll + by_place[2][f] * moved.sine
                 change = contact_step(field, fields, place, moved, contact, side, arm, step)
                 turning = spin_step(z, inertia, omega, axle, step)
                 slipping = vector_sum(vector_product(turning, P), vector_product(spin, change.P))

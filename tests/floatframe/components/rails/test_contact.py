@@ -123,15 +123,15 @@ def test_tread_and_flange_share_the_depth_without_counting_twice():
 
 def test_a_table_answers_as_the_search_it_was_made_of():
     rng = np.random.default_rng(5)
-    numbers = numbers_of_table(contact_table(NEW))
-    data, field = numbers, np.empty(13)
+    data, fields = numbers_of_table(contact_table(NEW)), np.empty((2, 13))
     worst = np.zeros((2, 4))
     for u, roll, yaw in rng.uniform([-0.012, -4e-3, -0.02], [0.009, 4e-3, 0.02], (60, 3)):
+        contact_fields(data, 0, u + NEW.radius * np.sin(roll), np.sin(roll), np.sin(yaw), fields.ravel())
         for part, name in enumerate(("tread", "flange")):
+            field = fields[part]
             exact = quasi_elastic(NEW, np.array([u]), roll=roll, yaw=yaw, part=name)
             if exact.q[0] < -2e-3:
                 continue
-            contact_fields(data, 0, part, u + NEW.radius * np.sin(roll), np.sin(roll), np.sin(yaw), field)
             defects = [
                 field[0] - exact.q[0],
                 field[1] - exact.slope[0],
