@@ -47,7 +47,6 @@ cms/assessment/compare/pulse.py words
 cms/assessment/correlation/update.py least
 cms/body/geometric_stiffness.py turned
 cms/body/reduced_body.py kept
-cms/cli/demo.py words
 cms/exchange/exporters/nodes.py words
 cms/exchange/programs/sid_fem.py words
 cms/jobs/acceptance/acceptance.py words

@@ -58,7 +58,8 @@ PIPE_WIDTH = 160  #: width in columns of tables that are not written to a termin
 
 def run(app: typer.Typer, name: str) -> None:
     """Run an application; text that the terminal's encoding cannot show is replaced and never causes an error."""
-    logging.getLogger().addHandler(Notes())
+    notes = Notes()
+    logging.getLogger().addHandler(notes)
     for stream in (sys.stdout, sys.stderr):
         reconfigure = getattr(stream, "reconfigure", None)
         if reconfigure is not None:
@@ -67,6 +68,7 @@ def run(app: typer.Typer, name: str) -> None:
         try:
             app(prog_name=name)
         finally:
+            logging.getLogger().removeHandler(notes)  # the process may run another command
             sys.stdout.flush()  # errors in writing are reported here, not by the interpreter at its end
     except KeyboardInterrupt:
         print_error("interrupted")

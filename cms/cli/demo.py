@@ -4,12 +4,11 @@ import os
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from tempfile import TemporaryFile
-from typing import IO, Annotated
+from typing import Annotated
 
 import typer
 
@@ -21,8 +20,13 @@ __all__ = ["demo_command", "run_demo"]
 
 JOBS = ("rod.toml", "crank.toml")  #: job files included in this package
 MODE = 3
-RUN_LATER = "floatframe.cli.run_later"  #: module that compiles kernels and runs a command when it is signalled
-FPS = 15  #: frames per second of the film of the motion, which lasts 8 s; drawing it takes most of the time
+RUN_LATER = "floatframe.cli.run_later"  #: module that compiles kernels and runs commands when it is signalled
+MOTION = (  #: commands of `floatframe`
+    "run crank.toml -o crank.h5",
+    "plot crank.h5 -o crank.png",
+    "animate crank.h5 --fps 12 -o crank.mp4",  # it lasts 8 s; drawing it takes most of the time
+    "schema system -o system.schema.json",
+)
 
 
 @guarded
@@ -31,7 +35,8 @@ def demo_command(
 ) -> None:
     """Run all steps with the included connecting rod.
 
-    Reduce, info, view, run, plot, animate: about a minute. Both programs have this command.
+    Reduce, info, view, run, plot, animate: some ten seconds, and half a minute more the first time. Both
+    programs have this command.
 
     Example: cms demo
     """
@@ -54,96 +59,79 @@ def run_demo(folder: Path) -> None:
 
 
 def run_steps(folder: Path) -> None:
-    """Run every command, each announced; independent commands run at the same time.
+    """Run every command, each announced, those of `cms` in this process and those of `floatframe` in another.
 
-    The process of the motion compiles its kernels during the reduction, which takes half a minute on a new machine.
+    That process compiles its kernels during the reduction, which takes half a minute on a new machine, and computes
+    the motion while modes are drawn.
     """
     from cms.cli.info import info_command, info_record
+    from cms.cli.modes import view_command
     from cms.cli.reduce import reduce_command
-    from fe_models.foundation.parametric_file import schemas_named_in
-    from fe_models.foundation.paths import replace_file, replace_files
+    from cms.cli.schema import schema_command_of
+    from fe_models.foundation.paths import replace_file
 
     modal = folder / "rod.h5"
     with ExitStack() as running:
-        run = begun(running, folder, "floatframe run crank.toml -o crank.h5", RUN_LATER)
+        motion = begun(running, folder, MOTION)
         announce(folder, "cms reduce rod.toml -o rod.h5")
         reduce_command([folder / "rod.toml"], modal)
-        run.signal()
-        view = begun(running, folder, f"cms view rod.h5 --mode {MODE} -o m{MODE}.png --animate m{MODE}.gif")
+        signal(motion)
         announce(folder, "cms info rod.h5")
         info_command(modal)
         announce(folder, "cms info rod.h5 --json > rod.json")
         replace_file(folder / "rod.json", info_record(modal).encode("utf-8"))
-        schemas = schemas_named_in((folder / name).read_bytes() for name in JOBS)  # seconds, during the run
-        replace_files({folder / name: content for name, content in schemas.items()})
-        with stages() as clock, clock("run; its kernels are compiled once on a machine"):
-            run.worker.wait()
-        later = [
-            begun(running, folder, words)
-            for words in (
-                "floatframe plot crank.h5 -o crank.png",
-                f"floatframe animate crank.h5 --fps {FPS} -o crank.mp4",
-            )
-            if run.worker.returncode == 0
-        ]
-        for each in (view, run, *later):
-            finish(folder, each)
+        announce(folder, "cms schema job -o job.schema.json")
+        schema_command_of("cms")("job", folder / "job.schema.json")
+        announce(folder, f"cms view rod.h5 --mode {MODE} -o m{MODE}.png --animate m{MODE}.gif")
+        view_command(modal, MODE, folder / f"m{MODE}.png", folder / f"m{MODE}.gif")
+        finish(motion)
 
 
-@dataclass(frozen=True, eq=False)
-class Begun:
-    """Command in a separate process, and the file that receives its output."""
+def begun(running: ExitStack, folder: Path, commands: Sequence[str]) -> subprocess.Popen[bytes]:
+    """Start the process that runs commands of `floatframe` in the folder; the stack terminates it.
 
-    words: str
-    worker: subprocess.Popen[bytes]
-    said: IO[bytes]
-
-    def signal(self) -> None:
-        """Let the command of a process of `RUN_LATER` run."""
-        assert self.worker.stdin is not None  # the pipe was opened with the process
-        with suppress(BrokenPipeError), self.worker.stdin as pipe:  # if the process has ended, `finish` shows why
-            pipe.write(b"run\n")
-
-
-def begun(running: ExitStack, folder: Path, words: str, module: str = "") -> Begun:
-    """Start a command, `cms ...` or `floatframe ...`, in the folder as a user does; the stack terminates it.
-
-    A module other than the command line of the program gets its arguments. Apart from this, the package does not know
-    `floatframe`.
+    Apart from its module, the package does not know `floatframe`.
     """
-    program, *arguments = words.split()
-    said = running.enter_context(TemporaryFile())
     worker = subprocess.Popen(
-        [sys.executable, "-P", "-m", module or f"{program}.cli", *arguments], cwd=folder, env=environment(),
-        stdin=subprocess.PIPE if module else subprocess.DEVNULL, stdout=said, stderr=subprocess.STDOUT,
+        [sys.executable, "-P", "-m", RUN_LATER, str(folder), *commands], cwd=folder, env=environment(),
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
     )  # fmt: skip
     running.callback(ended, worker)
-    return Begun(words, worker, said)
+    return worker
 
 
-def finish(folder: Path, command: Begun) -> None:
-    """Announce a started command, wait for its end, and print its output.
+def signal(worker: subprocess.Popen[bytes]) -> None:
+    """Let a process of `RUN_LATER` run its commands."""
+    assert worker.stdin is not None  # the pipe was opened with the process
+    with suppress(BrokenPipeError), worker.stdin as pipe:  # if the process has ended, `finish` shows why
+        pipe.write(b"run\n")
+
+
+def finish(worker: subprocess.Popen[bytes]) -> None:
+    """Print what the commands of a process print, as they do, until it ends.
 
     Raises
     ------
     typer.Exit
-        With the exit code of the command, which has printed its error.
+        With the exit code of the command that failed, which has printed its error.
     """
-    announce(folder, command.words)
-    sys.stdout.flush()
-    command.worker.wait()
-    command.said.seek(0)
-    typer.echo(command.said.read().decode(errors="replace"), nl=False)
-    if command.worker.returncode:
-        raise typer.Exit(command.worker.returncode)
+    assert worker.stdout is not None  # the pipe was opened with the process
+    with stages() as clock, clock("run; its kernels are compiled once on a machine"):
+        line = worker.stdout.readline()
+    while line:
+        typer.echo(line.decode(errors="replace"), nl=False)
+        line = worker.stdout.readline()
+    if worker.wait():
+        raise typer.Exit(worker.returncode)
 
 
 def ended(worker: subprocess.Popen[bytes]) -> None:
-    """Terminate a process that is still running."""
-    if worker.stdin is not None:
-        worker.stdin.close()
+    """Terminate a process that is still running, and close its pipes."""
     worker.kill()
     worker.wait()
+    for pipe in (worker.stdin, worker.stdout):
+        if pipe is not None:
+            pipe.close()
 
 
 def environment() -> dict[str, str]:

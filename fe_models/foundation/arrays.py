@@ -4,7 +4,6 @@ from dataclasses import field
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
 from fe_models.foundation.errors import BodyError
@@ -33,6 +32,7 @@ IntArray = NDArray[np.int64]
 # Types of the fields of records that take lists, tuples or arrays and hold arrays. A type checker learns both from the
 # two methods. It takes them into account only for fields with a value, so required fields are written `= given()`.
 if TYPE_CHECKING:
+    import scipy.sparse as sp
 
     class GivenArray:
         """A field that takes anything array-like and holds an array."""
@@ -100,8 +100,10 @@ def require_rows(where: str, u: Any, n_rows: int) -> None:
         raise BodyError(f"{where}: u: expected columns over {n_rows} dofs, got {np.shape(u)}")
 
 
-def symmetric_csc(where: str, matrix: Any, n: int) -> sp.csc_array:
+def symmetric_csc(where: str, matrix: Any, n: int) -> "sp.csc_array":
     """Return the matrix as CSC, (n, n), with sorted indices, after checks of shape, finiteness and symmetry."""
+    import scipy.sparse as sp  # not above: drawing processes have no matrices
+
     # for a symmetric matrix, compressed rows equal compressed columns
     csc = sp.csc_array(matrix.T if sp.issparse(matrix) and matrix.format == "csr" else matrix)
     require_shape(where, csc, (n, n))
@@ -121,7 +123,7 @@ def symmetric_part(A: Array) -> Array:
     return np.asarray((A + A.T) / 2)
 
 
-def symmetry_defect(csc: sp.csc_array) -> float:
+def symmetry_defect(csc: "sp.csc_array") -> float:
     """Return max |(A - A.T) x| / max |A| for a fixed random vector x.
 
     Two products avoid a transposed copy, which takes a gigabyte for the stiffness of a million dofs.

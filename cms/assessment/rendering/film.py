@@ -152,7 +152,7 @@ def write_mp4(frames: Iterable[Image], path: Path, fps: float) -> None:
     first = next(source)
     height, width = (n - n % 2 for n in first.shape[:2])
     options = (
-        "-vcodec", "libx264", "-crf", str(CRF), "-maxrate", str(RATE), "-bufsize", str(RATE),
+        "-vcodec", "libx264", "-preset", "veryfast", "-crf", str(CRF), "-maxrate", str(RATE), "-bufsize", str(RATE),
         "-pix_fmt", "yuv420p", "-movflags", "+faststart",
     )  # fmt: skip
     run_ffmpeg((frame[:height, :width] for frame in chain([first], source)), path, fps, options)

@@ -22,7 +22,6 @@ from cms.assessment.quality.body_record import body_record, central_inertia
 from cms.body.modal_file.contents import Content
 from cms.body.modal_file.file import VERSION, read, write, write_sealed
 from cms.cli import demo
-from cms.cli.app import app
 from cms.cli.outputs import DOCUMENTS, TABLES, output_files, write_outputs
 from cms.errors import JobError
 from cms.jobs.job import read_job
@@ -385,20 +384,21 @@ def test_the_demo_runs_the_whole_line_and_lists_its_files(tmp_path, monkeypatch)
         def write(self, line):
             self.run()
 
-    def begun_here(running, folder, words, module=""):
-        program, *arguments = words.split()
-        said, signal = io.BytesIO(), Signal()
+    def begun_here(running, folder, commands):
+        said = io.BytesIO()
 
         def run():
-            with contextlib.chdir(folder):
-                done = CliRunner().invoke({"cms": app, "floatframe": floatframe_app}[program], arguments)
-            assert done.exit_code == 0, done.output
-            said.write(done.output.encode())
+            for command in commands:
+                demo.announce(folder, f"floatframe {command}")
+                with contextlib.chdir(folder):
+                    done = CliRunner().invoke(floatframe_app, command.split())
+                assert done.exit_code == 0, done.output
+                said.write(done.output.encode())
+            said.seek(0)
 
+        signal = Signal()
         signal.run = run
-        if not module:
-            run()
-        return demo.Begun(words, SimpleNamespace(returncode=0, wait=lambda: 0, stdin=signal), said)
+        return SimpleNamespace(returncode=0, wait=lambda: 0, stdin=signal, stdout=said)
 
     for name in (
         "cms.assessment.report.view.view_mode", "cms.assessment.report.view.animate_mode",
@@ -423,7 +423,9 @@ def assert_demo_makes_its_files(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     result = run_cms("demo", code=0)
     files = contents(tmp_path / "demo")
-    for name in ("rod.h5", "m3.png", "m3.gif", "crank.h5", "crank.png", "crank.mp4"):
+    for name in (
+        "rod.h5", "job.schema.json", "m3.png", "m3.gif", "crank.h5", "crank.png", "crank.mp4", "system.schema.json",
+    ):  # fmt: skip
         assert name in files
         assert name in result.stdout
     for command in ("cms reduce", "cms info", "cms view", "floatframe run", "floatframe plot", "floatframe animate"):

@@ -1,3 +1,4 @@
+import logging
 import sys
 from contextlib import ExitStack
 from pathlib import Path
@@ -6,6 +7,7 @@ import pytest
 import typer
 
 from cms.cli import demo
+from cms.cli.console import commands, run
 from cms.errors import JobError
 from cms.jobs.job import read_job
 
@@ -41,16 +43,17 @@ def test_an_error_of_the_reduction_ends_the_process_that_compiles(monkeypatch, t
 
 
 @pytest.mark.parametrize("is_signalled", [True, False])
-def test_a_later_command_runs_at_its_signal_alone(is_signalled, tmp_path):
+def test_later_commands_run_at_their_signal_alone(is_signalled, tmp_path):
     with ExitStack() as running:
-        later = demo.begun(running, tmp_path, "floatframe --version", demo.RUN_LATER)
+        later = demo.begun(running, tmp_path, ["--version", "schema system -o s.json"])
         if is_signalled:
-            later.signal()
+            demo.signal(later)
         else:
-            later.worker.stdin.close()
-        assert later.worker.wait() == 0
-        later.said.seek(0)
-        assert later.said.read().startswith(b"floatframe") == is_signalled
+            later.stdin.close()
+        said = later.stdout.read().decode()
+        assert later.wait() == 0
+    assert (f"{tmp_path}$ floatframe --version\nfloatframe" in said) == is_signalled
+    assert (tmp_path / "s.json").exists() == is_signalled
 
 
 def test_the_compiling_process_compiles(monkeypatch, tmp_path):
@@ -65,14 +68,32 @@ def test_the_compiling_process_compiles(monkeypatch, tmp_path):
     assert Path(compile_kernels.__file__).name == "compile_kernels.py"
 
 
-def test_what_a_command_of_the_demo_says_is_shown_and_its_failure_ends_the_demo(tmp_path, capfd):
+def test_what_commands_of_the_demo_say_is_shown_and_the_first_failure_ends_it(tmp_path, capfd):
     with ExitStack() as running:
-        good = demo.begun(running, tmp_path, "cms --version")
-        bad = demo.begun(running, tmp_path, "cms info missing.h5")
-        demo.finish(tmp_path, good)
+        later = demo.begun(running, tmp_path, ["--version", "info missing.h5", "schema system -o s.json"])
+        demo.signal(later)
         with pytest.raises(typer.Exit) as ended:
-            demo.finish(tmp_path, bad)
+            demo.finish(later)
     said = capfd.readouterr().out
-    assert "$ cms --version\n" in said
-    assert "missing.h5" in said
+    assert "$ floatframe --version\nfloatframe" in said
+    assert said.count("missing.h5") >= 2  # the command, and its error
+    assert "s.json" not in said
     assert ended.value.exit_code == 2
+
+
+def test_a_note_is_printed_once_by_each_of_several_commands(monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["notes", "note"])
+    app = commands("notes", "A program.")
+
+    @app.command()
+    def note() -> None:
+        logging.getLogger("anything").warning("a word")
+
+    @app.command()
+    def other() -> None:
+        pass
+
+    for _ in range(2):
+        with pytest.raises(SystemExit):
+            run(app, "notes")
+        assert capsys.readouterr().err == "note: a word\n"
