@@ -1,16 +1,18 @@
 """The start: what `cms demo` and each of its commands take on a new machine (cold) and later (warm), and compilations.
 
-    python -m benchmarks.start              # some three minutes on two quiet cores
+    python -m benchmarks.start              # some six minutes on two quiet cores
     python -m benchmarks.start OLD          # beside another checkout, in turn
     python -m benchmarks.start OLD --runs 3 # the least of three runs of everything
 
 Cold: no kernel is compiled (`NUMBA_CACHE_DIR` is an empty folder); modules have their bytecode. Processor time of the
 process and all that it starts, user and system; and by the clock. A compilation is that of
-`python -m floatframe.cli.compile_kernels PART`, with its imports and the work that needs the kernels.
+`python -m floatframe.cli.compile_kernels PART`, with its imports and the work that needs the kernels. "From the wheel":
+the same with the wheel that `.ci/wheel` builds from the checkout, for the best family that this processor belongs to.
 """
 
 import argparse
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -57,6 +59,22 @@ def cost_of(words: str, tree: Path, cache: Path, folder: Path) -> Cost:
     return Cost(used, time.perf_counter() - began)
 
 
+def unpacked_wheel(tree: Path, folder: Path) -> Path:
+    """Return a folder with the packages of a checkout as its wheel brings them, with compiled code."""
+    from llvmlite.binding import get_host_cpu_features
+
+    from fe_models.foundation.kernels.jit import FAMILIES
+
+    known = {name for name, is_known in get_host_cpu_features().items() if is_known}
+    family = next(name for name, needed in FAMILIES.items() if needed <= known)
+    build = [tree / ".ci" / "wheel", folder / "dist", family]
+    subprocess.run(build, env=os.environ | {"PYTHON": sys.executable}, check=True, stdout=subprocess.DEVNULL)
+    (wheel,) = (folder / "dist").iterdir()
+    install = ["pip", "install", "-q", "--no-deps", "--target", folder / "packages", wheel]
+    subprocess.run([sys.executable, "-m", *install], check=True)
+    return folder / "packages"
+
+
 def costs(tree: Path, *, stages: bool) -> dict[str, Cost]:
     """Return what the start takes in a checkout; with `stages`, also each command of the demo."""
     found = {}
@@ -66,6 +84,13 @@ def costs(tree: Path, *, stages: bool) -> dict[str, Cost]:
         for part in COMPILED if stages else COMPILED[:1]:
             compile_part = f"floatframe.cli.compile_kernels {part}"
             found[f"first compilation: {part}"] = cost_of(compile_part, tree, folder / part, folder)
+        if (tree / ".ci" / "wheel").is_file():
+            packages = unpacked_wheel(tree, folder)
+            cost_of("cms.cli --help", packages, folder / "help", folder)
+            compile_motion = "floatframe.cli.compile_kernels motion"
+            found["first motion from the wheel"] = cost_of(compile_motion, packages, folder / "no cache", folder)
+            found["cms demo from the wheel, cold"] = cost_of("cms.cli demo", packages, folder / "none", folder)
+            shutil.rmtree(folder / "demo")
         for state in ("cold", "warm"):
             found[f"cms demo, {state}"] = cost_of("cms.cli demo", tree, folder / "cache", folder)
         for words in COMMANDS if stages else ():

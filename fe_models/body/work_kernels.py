@@ -1,10 +1,10 @@
 """Compiled products of fields at points; imported only where used."""
 
-from numba import njit
+from fe_models.foundation.kernels.jit import jit_with
 
 __all__ = ["work_products"]
 
-jit_fast = njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+jit_fast = jit_with(fastmath={"contract", "reassoc", "nsz"})
 
 
 @jit_fast

@@ -2,12 +2,15 @@
 
 Numba compiles the kernels once per machine and caches them, each part on one core. A separate process can compile while
 another core does other work. Kernels have a single signature, so any system compiles all kernels of a part. The last
-printed line reports the result as JSON: `{"compiled": true, "seconds": 12.3}`.
+printed line reports the result as JSON: `{"compiled": true, "from_package": false, "seconds": 12.3}`.
+
+With `--into FOLDER` and no parts, all are compiled, and their code is also written as the files that a package can
+bring along (fe_models/foundation/kernels/jit.py); `.ci/wheel` does this for each family of processors.
 """
 
+import argparse
 import json
 import logging
-import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -16,6 +19,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numba.core.event import install_recorder
 
+from fe_models.foundation.kernels import jit
 from floatframe.integrators.energy_momentum import EnergyMomentum
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha
 from floatframe.model.bodies.rigid_body import RigidBody
@@ -90,15 +94,19 @@ PARTS: dict[str, tuple[str, Callable[[], None]]] = {
 }
 
 
-def main(parts: Sequence[str] = ()) -> None:
-    """Compile the parts, and report whether anything was compiled."""
-    began = time.perf_counter()
+def main(parts: Sequence[str] = (), into: Path | None = None) -> None:
+    """Compile the parts, and report whether anything was compiled or came with the package; `into`: see above."""
+    began, jit.write_into = time.perf_counter(), into
     with install_recorder("numba:compile") as recorder:
-        for part in parts or ("motion",):
+        for part in parts or (PARTS if into else ("motion",)):
             PARTS[part][1]()
-    print(json.dumps({"compiled": len(recorder.buffer) > 0, "seconds": time.perf_counter() - began}))
+    report = {"compiled": len(recorder.buffer) > 0, "from_package": len(jit.came_with_package) > 0}
+    print(json.dumps(report | {"seconds": time.perf_counter() - began}))
 
 
 if __name__ == "__main__":
     logging.disable(logging.WARNING)  # they would say that this can be done in advance
-    main(sys.argv[1:])
+    parser = argparse.ArgumentParser()
+    parser.add_argument("parts", nargs="*")
+    parser.add_argument("--into", type=Path)
+    main(**vars(parser.parse_args()))

@@ -64,7 +64,7 @@ def prepare_command(
 
     Otherwise it is compiled at first use.
 
-    This is needed once after an installation; code that is already compiled is kept.
+    This is needed once after an installation; code that is already compiled, or came with the package, is kept.
 
     Example: floatframe prepare
     """
@@ -73,7 +73,7 @@ def prepare_command(
     from floatframe.errors import FloatframeError
 
     began, n_workers = time.perf_counter(), min(workers or os.cpu_count() or 1, len(PARTS))
-    say(f"compiling {len(PARTS)} parts ({words()}), {n_workers} at a time; this takes minutes")
+    say(f"preparing {len(PARTS)} parts ({words()}), {n_workers} at a time; compiling all takes minutes")
     with stages() as clock:
         done = prepare_parts(tuple(PARTS), n_workers, clock=clock, tell=lambda part, words: say(f"{part:<10} {words}"))
     say(f"done in {time.perf_counter() - began:.0f} s")
@@ -140,4 +140,6 @@ def result_words(report: dict[str, Any]) -> str:
     """Return what happened to a part."""
     if "failed" in report:
         return "failed"
-    return f"compiled in {report['seconds']:.0f} s" if report.get("compiled") else "was ready"
+    if report.get("compiled"):
+        return f"compiled in {report['seconds']:.0f} s"
+    return "came with the package" if report.get("from_package") else "was ready"

@@ -4,13 +4,12 @@ Graphs have the form described in `cms.linear_algebra.sparse_cholesky.separator_
 """
 
 import numpy as np
-from numba import njit
 
 from cms.linear_algebra.sparse_cholesky.separator_kernels import HERE, PENALTY, THERE, refine, start_cut
+from fe_models.foundation.kernels.jit import jit
 
 __all__ = ["dissect"]
 
-jit = njit(cache=True, nogil=True, error_model="numpy")
 
 WAYS = 6  #: number of orderings of a part; each gives a cut
 NEAR = 1.5  #: largest ratio of a cut's cost to the smallest cost for which it is refined; the best refined cut is used

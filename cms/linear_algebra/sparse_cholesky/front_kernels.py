@@ -9,11 +9,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import binding
-from numba import njit, types
+from numba import types
 
 from cms.linear_algebra.sparse_cholesky.lapack import routine_address
 from cms.linear_algebra.sparse_cholesky.tiles import ROWS
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.kernels.jit import jit
 
 __all__ = [
     "Entries",
@@ -29,8 +30,6 @@ __all__ = [
 
 TOGETHER = 8  #: number of tiles that are written together
 STRIPE = 64  #: number of columns per triangular solve of BLAS; products between stripes do the rest, twice as fast
-
-jit = njit(cache=True, nogil=True, error_model="numpy")
 
 
 def external(name: str) -> Any:

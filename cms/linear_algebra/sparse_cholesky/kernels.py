@@ -4,7 +4,8 @@ Graphs are given by compressed rows `start`, `neighbours`, without the vertex it
 """
 
 import numpy as np
-from numba import njit
+
+from fe_models.foundation.kernels.jit import jit
 
 __all__ = [
     "amalgamate",
@@ -17,8 +18,6 @@ __all__ = [
     "sums_over_rows",
     "weighted_counts",
 ]
-
-jit = njit(cache=True, nogil=True, error_model="numpy")
 
 
 @jit

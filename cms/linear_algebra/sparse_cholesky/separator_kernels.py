@@ -3,13 +3,12 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.kernels.jit import jit
 
 __all__ = ["BETWEEN", "HERE", "THERE", "Cut", "Graph", "cost_of", "refine", "start_cut", "workspace"]
 
-jit = njit(cache=True, nogil=True, error_model="numpy")
 
 HERE, THERE, BETWEEN = 0, 1, 2  # sides of a vertex, and the separator
 PENALTY = 1.5  #: exponent of the shares of both sides in the cost of a separator, which penalises uneven halves

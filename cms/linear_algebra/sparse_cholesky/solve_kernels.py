@@ -7,7 +7,6 @@ to whole tiles, so the last rows may be unused.
 """
 
 import numpy as np
-from numba import njit
 
 from cms.linear_algebra.sparse_cholesky.tiles import (
     LANES,
@@ -17,10 +16,9 @@ from cms.linear_algebra.sparse_cholesky.tiles import (
     subtract_tile,
     subtract_transposed_tile,
 )
+from fe_models.foundation.kernels.jit import jit
 
 __all__ = ["begin_rows", "eliminate_fronts", "finish_rows", "substitute_back", "take_rows_of"]
-
-jit = njit(cache=True, nogil=True, error_model="numpy")
 
 
 @jit

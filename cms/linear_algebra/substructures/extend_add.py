@@ -1,12 +1,10 @@
 """Compiled loops that add the contribution of a substructure to the enclosing one; imported only where used."""
 
-from numba import njit
+from fe_models.foundation.kernels.jit import jit
 
 __all__ = ["extend_add", "put_rows"]
 
 TILE = 32  #: rows and columns that are transposed at a time
-
-jit = njit(cache=True, nogil=True, error_model="numpy")
 
 
 @jit

@@ -1,11 +1,12 @@
 """Compiled loops of the recovery on patches (`patches`), imported lazily; a kernel does one part of the rows."""
 
 import numpy as np
-from numba import njit
+
+from fe_models.foundation.kernels.jit import jit_with
 
 __all__ = ["write_moments", "write_node_values"]
 
-jit = njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+jit = jit_with(fastmath={"contract"})
 
 WIDTH = 64  #: number of columns at a time; the samples of a patch then stay in the nearest cache
 

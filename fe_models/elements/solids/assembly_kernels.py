@@ -5,7 +5,8 @@ The shares run in threads without locks, and the order of additions to an entry 
 """
 
 import numpy as np
-from numba import njit
+
+from fe_models.foundation.kernels.jit import jit, jit_with
 
 __all__ = [
     "element_matrices",
@@ -21,8 +22,7 @@ __all__ = [
 #: number of consecutive nodes in a stripe; parts take stripes in turn, which balances the load for any node order
 STRIPE = 64
 
-jit = njit(cache=True, nogil=True, error_model="numpy")
-jit_fma = njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})  # only allow fused a * b + c
+jit_fma = jit_with(fastmath={"contract"})  # only allow fused a * b + c
 
 
 @jit

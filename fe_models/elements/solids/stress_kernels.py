@@ -1,17 +1,16 @@
 """Compiled loops over the points of solid elements: stress, internal forces, geometric stiffness; imported lazily."""
 
 import numpy as np
-from numba import njit
 
 from fe_models.elements.solids.assembly_kernels import jacobian
+from fe_models.foundation.kernels.jit import jit, jit_with
 
 __all__ = [
     "add_affine_defects", "add_element_stress", "add_internal_forces", "add_stress_defects", "stress_and_products",
     "volume_at_nodes", "write_cell_stress", "write_scalar_matrices",
 ]  # fmt: skip
 
-jit = njit(cache=True, nogil=True, error_model="numpy")
-jit_fast = njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+jit_fast = jit_with(fastmath={"contract", "reassoc", "nsz"})
 
 FIRST, SECOND = np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1])  # xx yy zz yz xz xy
 

@@ -1,13 +1,12 @@
 """Compiled check of every byte in a text of numbers; imported only when used, because importing numba is slow."""
 
 import numpy as np
-from numba import njit
 
 from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.kernels.jit import jit
 
 __all__ = ["FORBIDDEN", "LINE", "judged_bytes"]
 
-jit = njit(cache=True, nogil=True, error_model="numpy")
 
 BLANK, DIGIT, SIGN, DOT, EXPONENT, LINE, OTHER = range(7)  #: kinds of bytes
 FOLLOWS = {

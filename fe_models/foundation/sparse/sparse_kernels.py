@@ -4,11 +4,10 @@ A kernel works on one share of the columns, `part` of `n_parts`, and writes only
 """
 
 import numpy as np
-from numba import njit
+
+from fe_models.foundation.kernels.jit import jit
 
 __all__ = ["column_counts", "column_entries", "multiply_rows", "n_scalar_nodes", "scalar_entries"]
-
-jit = njit(cache=True, nogil=True, error_model="numpy")
 
 
 @jit

@@ -4,7 +4,6 @@ Inner functions become machine code with the entry that calls them (kernels/comp
 disk. The intermediate code of each inner function is cached too, under a key of everything on which it depends
 (kernels/compiler/stored.py), so that an entry that is compiled again reads the functions that have not changed.
 
-numba checks only the file of a cached function for changes. Therefore each entry has in its closure a digest of its own
-source and of all modules that it imports directly or indirectly (kernels/compiler/sources.py). numba includes the
-closure in the key of its cache, so that no entry is ever run with stale inner functions.
+Entries are stored under keys that change with their own source and with all modules that it imports, directly or
+indirectly (fe_models/foundation/kernels), so that no entry is ever run with stale inner functions.
 """

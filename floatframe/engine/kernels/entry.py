@@ -4,7 +4,6 @@ There is one entry, because numba compiles and links all inner functions again f
 """
 
 import logging
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from numba import types
@@ -12,9 +11,8 @@ from numba import types
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.stages import announced_compilation
 from floatframe.engine.kernels.body import NewtonWeights
-from floatframe.engine.kernels.compiler.choice import compiler, is_interpreted, is_lean, words
-from floatframe.engine.kernels.compiler.compilation import kept_entry
-from floatframe.engine.kernels.compiler.sources import source_digest
+from floatframe.engine.kernels.compiler.choice import is_interpreted, is_lean, words
+from floatframe.engine.kernels.compiler.compilation import entry
 from floatframe.engine.kernels.compiler.structure import converter, table_of_numbers
 from floatframe.engine.kernels.connections.connection import constraint_rates
 from floatframe.engine.kernels.diagnostics import power
@@ -91,41 +89,36 @@ as_model, as_work, as_memory = converter(Model()), converter(Work()), converter(
 as_rows, as_order = converter(Rows()), converter(Order())
 
 
-def make_entry(digest):
-    """Return the cached entry; the digest of the sources is part of its key, see the package docstring."""
-
-    def run(model_table, work_table, memory_table, rows_table, order_table):
-        if digest == 0:
-            return DONE, 0, 0, -1, 0.0
-        model, work = as_model(model_table), as_work(work_table)
-        memory, rows, order = as_memory(memory_table), as_rows(rows_table), as_order(order_table)
-        what = order.what
-        if what == ADVANCE:
-            return advance(model, work, memory, rows, (), order)
-        if what == COUNT:
-            load_state(work.state, memory)
-            count_turns(model, work, memory, order.h)
-        elif what == OBSERVE:
-            work.counted.rows = 0
-            write_row(model, work, memory, order.t0, rows)
-            memory.power[GIVEN], memory.power[TAKEN] = power(model, work)
+@entry
+def run(model_table, work_table, memory_table, rows_table, order_table):
+    """Carry out a request; the arguments are the tables of the records."""
+    model, work = as_model(model_table), as_work(work_table)
+    memory, rows, order = as_memory(memory_table), as_rows(rows_table), as_order(order_table)
+    what = order.what
+    if what == ADVANCE:
+        return advance(model, work, memory, rows, (), order)
+    if what == COUNT:
+        load_state(work.state, memory)
+        count_turns(model, work, memory, order.h)
+    elif what == OBSERVE:
+        work.counted.rows = 0
+        write_row(model, work, memory, order.t0, rows)
+        memory.power[GIVEN], memory.power[TAKEN] = power(model, work)
+    else:
+        weights, c_k = NewtonWeights(order.c_m, order.c_d, order.c_k), order.c_k
+        evaluate(model, work, c_k if c_k > 0.0 else 1.0)
+        if what == LINEARIZE:
+            linearize(model, work, weights)
+        elif what == RATES:
+            constraint_rates(model, work)
         else:
-            weights, c_k = NewtonWeights(order.c_m, order.c_d, order.c_k), order.c_k
-            evaluate(model, work, c_k if c_k > 0.0 else 1.0)
-            if what == LINEARIZE:
-                linearize(model, work, weights)
-            elif what == RATES:
-                constraint_rates(model, work)
-            else:
-                body = factorize_bodies(model, work, weights)
-                if body >= 0:
-                    return SINGULAR_BODY, 0, 0, body, 0.0
-                connection = correction(model, work, c_k, what == CORRECT)
-                if connection >= 0:
-                    return SINGULAR_CONNECTION, 0, 0, connection, 0.0
-        return DONE, 0, 0, -1, 0.0
-
-    return kept_entry(run)
+            body = factorize_bodies(model, work, weights)
+            if body >= 0:
+                return SINGULAR_BODY, 0, 0, body, 0.0
+            connection = correction(model, work, c_k, what == CORRECT)
+            if connection >= 0:
+                return SINGULAR_CONNECTION, 0, 0, connection, 0.0
+    return DONE, 0, 0, -1, 0.0
 
 
 NO_SIZES = dict.fromkeys(("n_t", "n_b", "n_c", "n_q", "n_u", "n_w", "n_remembered", "angles", "loads", "body loads"), 0)
@@ -139,8 +132,8 @@ class CompiledEntry:
     the rows of results, and of the order.
     """
 
-    def __init__(self, make: Callable[[int], Any], module: str, n_records: int) -> None:
-        self.compiled = make(source_digest(module, compiler))
+    def __init__(self, compiled: Any, n_records: int) -> None:
+        self.compiled = compiled
         self.signature = (types.Array(types.int64, 1, "C"),) * (n_records + 3)
         self.is_ready = is_interpreted
 
@@ -185,7 +178,7 @@ class CompiledEntry:
         return Rows(*(array[: outcome.n_rows] for array in rows)), outcome
 
 
-absolute_kernels = CompiledEntry(make_entry, __name__, n_records=2)
+absolute_kernels = CompiledEntry(run, n_records=2)
 
 
 def prepare() -> bool:

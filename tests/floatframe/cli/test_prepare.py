@@ -15,7 +15,8 @@ began = time.time()
 time.sleep(0.3)
 if part == "broken": raise SystemExit("no compiler")
 print("words of a library")
-print(json.dumps({"compiled": part == "motion", "seconds": time.time() - began, "at": began}))
+told = {"compiled": part == "motion", "from_package": part != "relative"}
+print(json.dumps(told | {"seconds": time.time() - began, "at": began}))
 """
 
 
@@ -35,11 +36,13 @@ def test_a_part_that_needs_another_begins_when_that_is_done():
 
 def test_each_part_is_announced_and_says_what_happened_to_it():
     told = []
-    prepare.prepare_parts(("relative", "motion", "broken"), 1, tell=lambda part, words: told.append((part, words)))
-    assert [part for part, _ in told] == ["motion", "motion", "relative", "relative", "broken", "broken"]
+    parts = ("relative", "motion", "reduction", "broken")
+    prepare.prepare_parts(parts, 1, tell=lambda part, words: told.append((part, words)))
+    assert [part for part, _ in told][::2] == ["motion", "relative", "reduction", "broken"]
+    assert [part for part, _ in told][1::2] == ["motion", "relative", "reduction", "broken"]
     assert [words for _, words in told][:3] == [f"begins: {PARTS['motion'][0]}", "compiled in 0 s",
                                                 f"begins: {PARTS['relative'][0]}"]  # fmt: skip
-    assert [words for _, words in told][3:] == ["was ready", "begins: broken", "failed"]
+    assert [words for _, words in told][3::2] == ["was ready", "came with the package", "failed"]
 
 
 def test_a_part_that_fails_says_why_and_leaves_the_others():

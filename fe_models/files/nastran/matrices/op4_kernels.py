@@ -6,7 +6,8 @@ the first of two words is the high one.
 """
 
 import numpy as np
-from numba import njit
+
+from fe_models.foundation.kernels.jit import jit
 
 __all__ = ["COMPLETE", "FAULTS", "fill_records", "read_columns", "record_words"]
 
@@ -22,8 +23,6 @@ FAULTS = {
 }  #: description of the error for each status of `read_columns`
 
 LOW = np.int64(0xFFFFFFFF)
-
-jit = njit(cache=True, nogil=True, error_model="numpy")
 
 
 @jit

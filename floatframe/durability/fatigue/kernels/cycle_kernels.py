@@ -12,9 +12,9 @@ the history continues in the same direction, so that cycles close as soon as the
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.kernels.jit import jit
 from floatframe.durability.fatigue.mean_stress import FKM, GERBER, LINE, NONE, SWT, WALKER, MeanStress
 from floatframe.durability.fatigue.sn_curve import SNCurve
 
@@ -31,7 +31,6 @@ __all__ = [
     "sums_of_reversals",
 ]
 
-compiled = njit(cache=True, nogil=True, error_model="numpy")
 
 CLOSED, OVER = 0, 1  #: columns of counts: all cycles (half cycles as 1/2), and cycles beyond the curve
 
@@ -59,7 +58,7 @@ def cycle_rule(curve: SNCurve, mean_stress: MeanStress) -> CycleRule:
     )  # fmt: skip
 
 
-@compiled
+@jit
 def reversed_amplitude(rule, S_a, S_m):
     """Return S_ar, the fully reversed amplitude of a cycle; inf if its mean reaches the strength (`mean_stress`)."""
     if rule.law == LINE:
@@ -89,7 +88,7 @@ def reversed_amplitude(rule, S_a, S_m):
     return S_a
 
 
-@compiled
+@jit
 def equivalent_amplitude(rule, S_a, S_m):
     """Return S, the amplitude at the stress ratio of the curve with the same S_ar; its cycles have the mean c S."""
     if rule.law == NONE:
@@ -108,7 +107,7 @@ def equivalent_amplitude(rule, S_a, S_m):
     return S_ar / reversed_amplitude(rule, 1.0, c)  # the other laws are homogeneous
 
 
-@compiled
+@jit
 def damage_of(rule, S):
     """Return 1/N for an amplitude S of the curve."""
     if not S > 0.0:
@@ -119,7 +118,7 @@ def damage_of(rule, S):
     return 0.0
 
 
-@compiled
+@jit
 def sums_of_reversals(rule, levels, sizes, weights, out):
     """Write out_l = sum_i weights_i d(levels_l sizes_i), (n_levels,), with the damage d of a reversed cycle.
 
@@ -137,7 +136,7 @@ def sums_of_reversals(rule, levels, sizes, weights, out):
         out[level] = total
 
 
-@compiled
+@jit
 def count(rule, x, y, weight, damage, counts, largest, n):
     """Count the cycle between turning points x and y."""
     S = equivalent_amplitude(rule, 0.5 * abs(x - y), 0.5 * (x + y))
@@ -149,7 +148,7 @@ def count(rule, x, y, weight, damage, counts, largest, n):
         counts[n, OVER] += weight
 
 
-@compiled
+@jit
 def close(stack, depth, s, closed):
     """Remove closed cycles from a stack whose last range rises (s = 1) or falls (-1); return depth, number, next level.
 
@@ -167,7 +166,7 @@ def close(stack, depth, s, closed):
     return depth, n, np.inf
 
 
-@compiled
+@jit
 def push(values, first, stack, depth, closed):
     """Stream values from index `first` into a stack until cycles close; return next index, depth, number of cycles.
 
@@ -201,7 +200,7 @@ def push(values, first, stack, depth, closed):
     return i, depth, n
 
 
-@compiled
+@jit
 def push_block(rule, values, stack, depths, closed, damage, counts, largest):
     """Stream a chunk of histories into the stacks, and count the cycles that close.
 
@@ -225,7 +224,7 @@ def push_block(rule, values, stack, depths, closed, damage, counts, largest):
         depths[n] = depth
 
 
-@compiled
+@jit
 def finish_block(rule, stack, depths, damage, counts, largest):
     """Count the ranges of the residues as half cycles."""
     for n in range(depths.size):
@@ -233,7 +232,7 @@ def finish_block(rule, stack, depths, damage, counts, largest):
             count(rule, stack[n, i - 1], stack[n, i], 0.5, damage, counts, largest, n)
 
 
-@compiled
+@jit
 def close_block(rule, stack, depths, closed, damage, counts, largest):
     """Append each residue to itself once, which gives the cycles of an endlessly repeated history.
 
@@ -245,7 +244,7 @@ def close_block(rule, stack, depths, closed, damage, counts, largest):
                    counts[n : n + 1], largest[n : n + 1])  # fmt: skip
 
 
-@compiled
+@jit
 def collect(values, is_repeated):
     """Return the cycles of one history: first and second turning point, and count, (n_cycles, 3)."""
     stack, closed = np.empty(2 * values.size + 2), np.empty((values.size + 2, 2))

@@ -6,16 +6,14 @@ time after the cycle has closed, which is conservative.
 """
 
 import numpy as np
-from numba import njit
 
+from fe_models.foundation.kernels.jit import jit
 from floatframe.durability.fatigue.kernels.cycle_kernels import CLOSED, OVER, damage_of
 
 __all__ = ["count_findley", "push_findley"]
 
-compiled = njit(cache=True, nogil=True, error_model="numpy")
 
-
-@compiled
+@jit
 def count_findley(rule, k, weight, x, y, normal, damage, counts, largest, n):
     """Count a cycle with the amplitude S = 2 (tau_a + k max(normal, 0)) / (k + sqrt(1 + k²)) of a bar under tension."""
     S = 2.0 * (0.5 * abs(x - y) + k * max(normal, 0.0)) / (k + np.sqrt(1.0 + k * k))
@@ -28,7 +26,7 @@ def count_findley(rule, k, weight, x, y, normal, damage, counts, largest, n):
         counts[n, OVER] += weight
 
 
-@compiled
+@jit
 def push_findley(rule, k, shear, normal, stack, most, depths, damage, counts, largest):
     """Stream shear and normal stress on planes, (n_planes, n_times), into stacks, and count the cycles that close.
 
@@ -63,7 +61,7 @@ def push_findley(rule, k, shear, normal, stack, most, depths, damage, counts, la
         depths[n] = depth
 
 
-@compiled
+@jit
 def finish_findley(rule, k, stack, most, depths, damage, counts, largest):
     """Count the ranges of the residues as half cycles."""
     for n in range(depths.size):
@@ -71,7 +69,7 @@ def finish_findley(rule, k, stack, most, depths, damage, counts, largest):
             count_findley(rule, k, 0.5, stack[n, i - 1], stack[n, i], most[n, i], damage, counts, largest, n)
 
 
-@compiled
+@jit
 def close_findley(rule, k, stack, most, depths, damage, counts, largest):
     """Append each residue to itself once; the stacks are twice as long as the largest depth."""
     for n in range(depths.size):

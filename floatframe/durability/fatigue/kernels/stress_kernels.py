@@ -4,14 +4,13 @@ The components are xx yy zz yz xz xy. Loops over time have no branches, so that 
 """
 
 import numpy as np
-from numba import njit
+
+from fe_models.foundation.kernels.jit import jit
 
 __all__ = ["largest_principal", "plane_principal", "plane_von_mises", "signed_von_mises"]
 
-compiled = njit(cache=True, nogil=True, error_model="numpy")
 
-
-@compiled
+@jit
 def signed_von_mises(stress, out):
     """Von Mises stress with the sign of the principal stress of largest absolute value, (n, 6, n_t) -> (n, n_t).
 
@@ -34,7 +33,7 @@ def signed_von_mises(stress, out):
             out[n, t] = size if is_positive else -size
 
 
-@compiled
+@jit
 def largest_principal(stress, out):
     """The principal stress of largest absolute value, (n, 6, n_t) -> (n, n_t).
 
@@ -54,7 +53,7 @@ def largest_principal(stress, out):
             out[n, t] = high if high >= -low else low
 
 
-@compiled
+@jit
 def plane_von_mises(stress, out):
     """Signed von Mises stress of stress in a plane, components xx yy xy, (n, 3, n_t) -> (n, n_t)."""
     for n in range(stress.shape[0]):
@@ -64,7 +63,7 @@ def plane_von_mises(stress, out):
             out[n, t] = size if xx + yy >= 0.0 else -size
 
 
-@compiled
+@jit
 def plane_principal(stress, out):
     """The principal stress of largest absolute value in plane stress, components xx yy xy, (n, 3, n_t) -> (n, n_t)."""
     for n in range(stress.shape[0]):

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from floatframe.engine.kernels.compiler.sources import names_of
+from fe_models.foundation.kernels.sources import names_of
 
 __all__ = ["digest_of"]
 

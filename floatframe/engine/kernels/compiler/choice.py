@@ -22,7 +22,7 @@ from numba.core import config
 
 from floatframe.errors import FloatframeError
 
-__all__ = ["KNOWN_VERSIONS", "VARIABLE", "compiler", "is_interpreted", "is_lean", "level", "words"]
+__all__ = ["KNOWN_VERSIONS", "VARIABLE", "is_interpreted", "is_lean", "level", "words"]
 
 KNOWN_VERSIONS = ("0.68",)  #: versions of numba whose internals the lean compiler supports
 VARIABLE = "FLOATFRAME_COMPILER"  #: environment variable that selects one of `CHOICES`
@@ -47,7 +47,6 @@ def chosen() -> str:
 is_lean = chosen() == "lean"
 is_interpreted = chosen() == "interpreted"
 level = int(config.OPT)  # type: ignore[attr-defined]  #: level of optimisation, from NUMBA_OPT
-compiler = f"{chosen()} at level {level}"  #: the settings that determine the machine code of a given source
 
 
 def words() -> str:

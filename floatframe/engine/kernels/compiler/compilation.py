@@ -5,8 +5,7 @@
     matrix_loops    a long function of this kind with many callers
     small           an inner function that is inlined: a few operations, or a part of one function
     view            an inlined function that returns parts of arrays
-    entry           a function that Python calls
-    kept_entry      an entry with one signature, which is compiled in each process if it cannot be cached on disk
+    entry           a function that Python calls, whose code is stored (fe_models/foundation/kernels/jit.py)
 
 The lean compiler compiles them if it supports the installed numba, otherwise plain numba. To debug kernels, they can
 run as Python; see kernels/compiler/choice.py.
@@ -48,15 +47,4 @@ else:
         view,
     )
 
-__all__ = ["array_type", "array_value", "entry", "inner", "kept_entry", "loops", "matrix_loops", "small", "view"]
-
-
-def kept_entry(function):
-    """Return the compiled function that Python calls.
-
-    It is stored on disk, or compiled in each process if it cannot be stored.
-    """
-    try:
-        return entry(function)
-    except RuntimeError:  # there is no folder for the cache
-        return entry(function, cache=False)
+__all__ = ["array_type", "array_value", "entry", "inner", "loops", "matrix_loops", "small", "view"]

@@ -18,9 +18,9 @@ from numba.core.dispatcher import Dispatcher
 from numba.core.registry import cpu_target
 from numba.extending import intrinsic
 
+from fe_models.foundation.kernels.sources import names_of
 from floatframe.engine.kernels.compiler.block import SafeBlock, make_block, parts_of
 from floatframe.engine.kernels.compiler.lean import LawEntryCompiler, NotLeanError, of_law
-from floatframe.engine.kernels.compiler.sources import names_of
 
 __all__ = ["LawEntryCompiler", "block_at", "lean_law", "new_vector"]
 

@@ -50,6 +50,7 @@ from numba.core.types.functions import BaseFunction
 from numba.core.typing import signature
 from numba.core.untyped_passes import ExtractByteCode, FixupArgs, IRProcessing, TranslateByteCode
 
+from fe_models.foundation.kernels.jit import stored
 from floatframe.engine.kernels.compiler.block import Block, make_block
 from floatframe.engine.kernels.compiler.choice import level
 from floatframe.engine.kernels.compiler.garbage import without_garbage_collection
@@ -555,7 +556,8 @@ of_law = decorator(LawCompiler)  #: decorator of functions of laws
 
 def entry(function, *, cache=True):
     """Return the compiled function that Python calls."""
-    return njit(function, cache=cache, error_model="numpy", pipeline_class=EntryCompiler)
+    compiled = njit(function, error_model="numpy", pipeline_class=EntryCompiler)
+    return stored(compiled) if cache else compiled
 
 
 def array_type(dtype, ndim):

@@ -7,6 +7,8 @@ from llvmlite import ir
 from numba import njit, types
 from numba.core import cgutils
 
+from fe_models.foundation.kernels.jit import stored
+
 __all__ = ["array_type", "array_value", "entry", "inner", "loops", "matrix_loops", "small", "view"]
 
 WORD = ir.IntType(64)
@@ -17,7 +19,8 @@ inner = small = loops = matrix_loops = view = njit(error_model="numpy", no_cpyth
 
 def entry(function, *, cache=True):
     """Return the compiled function that Python calls."""
-    return njit(function, cache=cache, error_model="numpy")
+    compiled = njit(function, error_model="numpy")
+    return stored(compiled) if cache else compiled
 
 
 def array_type(dtype, ndim):

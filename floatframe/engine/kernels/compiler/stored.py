@@ -30,7 +30,7 @@ from numba import types
 from numba.core.dispatcher import Dispatcher
 from numba.extending import _Intrinsic
 
-from floatframe.engine.kernels.compiler.sources import PACKAGES
+from fe_models.foundation.kernels.sources import PACKAGES
 
 __all__ = ["StoredCode", "code_key", "compiler_key", "delete_old", "read_code", "write_code"]
 

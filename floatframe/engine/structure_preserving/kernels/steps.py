@@ -3,7 +3,7 @@
 Described in `floatframe.integrators.energy_momentum`, `floatframe.integrators.variational`.
 """
 
-from floatframe.engine.kernels.compiler.compilation import inner, kept_entry
+from floatframe.engine.kernels.compiler.compilation import entry, inner
 from floatframe.engine.kernels.compiler.structure import converter
 from floatframe.engine.kernels.connections.contact import contact_gap
 from floatframe.engine.kernels.connections.gap import next_step
@@ -337,17 +337,12 @@ as_rows, as_order = converter(Rows()), converter(Order())
 as_discrete, as_step = converter(Discrete()), converter(StepWork())
 
 
-def make_entry(digest):
-    """Return the cached entry; the digest of the sources is part of its key."""
-
-    def run(model_table, work_table, discrete_table, step_table, memory_table, rows_table, order_table):
-        if digest == 0:
-            return 0, 0, 0, -1, 0.0
-        model, work, discrete = as_model(model_table), as_work(work_table), as_discrete(discrete_table)
-        step, memory = as_step(step_table), as_memory(memory_table)
-        return advance(model, work, memory, as_rows(rows_table), (discrete, step), as_order(order_table))
-
-    return kept_entry(run)
+@entry
+def run(model_table, work_table, discrete_table, step_table, memory_table, rows_table, order_table):
+    """Carry out a request; the arguments are the tables of the records."""
+    model, work, discrete = as_model(model_table), as_work(work_table), as_discrete(discrete_table)
+    step, memory = as_step(step_table), as_memory(memory_table)
+    return advance(model, work, memory, as_rows(rows_table), (discrete, step), as_order(order_table))
 
 
-discrete_kernels = CompiledEntry(make_entry, __name__, n_records=4)
+discrete_kernels = CompiledEntry(run, n_records=4)

@@ -4,7 +4,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.engine.kernels.body import NewtonWeights
-from floatframe.engine.kernels.compiler.compilation import kept_entry
+from floatframe.engine.kernels.compiler.compilation import entry
 from floatframe.engine.kernels.compiler.structure import converter
 from floatframe.engine.kernels.diagnostics import power
 from floatframe.engine.kernels.entry import ADVANCE, OBSERVE, CompiledEntry, Order, Outcome
@@ -44,52 +44,47 @@ as_memory, as_rows = converter(Memory()), converter(Rows())
 as_tangent = converter(TangentWork())
 
 
-def make_entry(digest):
-    """Return the cached entry; the digest of the sources is part of its key."""
-
-    def run(model_table, work_table, tree_table, joint_table, tangent_table, memory_table, rows_table, order_table):
-        if digest == 0:
-            return DONE, 0, 0, -1, 0.0
-        model, work, tree = as_model(model_table), as_work(work_table), as_tree(tree_table)
-        joints, tangent, order = as_joints(joint_table), as_tangent(tangent_table), as_order(order_table)
-        memory, rows = as_memory(memory_table), as_rows(rows_table)
-        what = order.what
-        if what == ADVANCE:
-            return advance_tree(model, work, memory, rows, (tree, joints, tangent), order)
-        if what == OBSERVE:
-            work.counted.rows = 0
-            write_tree_row(model, work, memory, tree, joints, order.t0, rows)
-            memory.power[GIVEN], memory.power[TAKEN] = power(model, work)
-        elif what == MOTION_OF_JOINTS:
-            joint_motion(model, work, tree, joints)
-        elif what == MOTION_OF_BODIES:
-            place_bodies(model, work, tree, joints)
-        elif what == MOVE:
-            move_joints(tree, joints)
-            place_bodies(model, work, tree, joints)
-        elif what == PROJECT:
-            evaluate_tree(model, work, tree, joints, order.c_k)
-            put_reactions(model, work, tree, joints)
-        elif what == CONSTRAIN:
-            constrain(model, work, tree, joints, tangent, order.n_steps == 1)
-        elif what == ACCELERATE:
-            if not accelerate(model, work, tree, joints, tangent):
-                return SINGULAR, 0, 0, -1, 0.0
-        elif what == CORRECT:
-            weights, c_k = NewtonWeights(order.c_m, order.c_d, order.c_k), order.c_k
-            evaluate_tree(model, work, tree, joints, c_k)
-            tangent.is_kept, tangent.exactly = 0, 1 - order.n_steps
-            if not renew(model, work, tree, joints, tangent, weights):
-                return SINGULAR, 0, 0, -1, 0.0
-            correct(model, work, tree, joints, tangent, c_k)
-        else:
-            weights, c_k = NewtonWeights(order.c_m, order.c_d, order.c_k), order.c_k
-            evaluate_tree(model, work, tree, joints, c_k if c_k > 0.0 else 1.0)
-            write_tangent(model, work, tree, joints, tangent, weights)
-            assemble(model, work, tree, tangent, order.c_d, c_k)
-        return DONE, 0, 0, -1, 0.0
-
-    return kept_entry(run)
+@entry
+def run(model_table, work_table, tree_table, joint_table, tangent_table, memory_table, rows_table, order_table):
+    """Carry out a request; the arguments are the tables of the records."""
+    model, work, tree = as_model(model_table), as_work(work_table), as_tree(tree_table)
+    joints, tangent, order = as_joints(joint_table), as_tangent(tangent_table), as_order(order_table)
+    memory, rows = as_memory(memory_table), as_rows(rows_table)
+    what = order.what
+    if what == ADVANCE:
+        return advance_tree(model, work, memory, rows, (tree, joints, tangent), order)
+    if what == OBSERVE:
+        work.counted.rows = 0
+        write_tree_row(model, work, memory, tree, joints, order.t0, rows)
+        memory.power[GIVEN], memory.power[TAKEN] = power(model, work)
+    elif what == MOTION_OF_JOINTS:
+        joint_motion(model, work, tree, joints)
+    elif what == MOTION_OF_BODIES:
+        place_bodies(model, work, tree, joints)
+    elif what == MOVE:
+        move_joints(tree, joints)
+        place_bodies(model, work, tree, joints)
+    elif what == PROJECT:
+        evaluate_tree(model, work, tree, joints, order.c_k)
+        put_reactions(model, work, tree, joints)
+    elif what == CONSTRAIN:
+        constrain(model, work, tree, joints, tangent, order.n_steps == 1)
+    elif what == ACCELERATE:
+        if not accelerate(model, work, tree, joints, tangent):
+            return SINGULAR, 0, 0, -1, 0.0
+    elif what == CORRECT:
+        weights, c_k = NewtonWeights(order.c_m, order.c_d, order.c_k), order.c_k
+        evaluate_tree(model, work, tree, joints, c_k)
+        tangent.is_kept, tangent.exactly = 0, 1 - order.n_steps
+        if not renew(model, work, tree, joints, tangent, weights):
+            return SINGULAR, 0, 0, -1, 0.0
+        correct(model, work, tree, joints, tangent, c_k)
+    else:
+        weights, c_k = NewtonWeights(order.c_m, order.c_d, order.c_k), order.c_k
+        evaluate_tree(model, work, tree, joints, c_k if c_k > 0.0 else 1.0)
+        write_tangent(model, work, tree, joints, tangent, weights)
+        assemble(model, work, tree, tangent, order.c_d, c_k)
+    return DONE, 0, 0, -1, 0.0
 
 
 NO_TANGENT = zeros(
@@ -112,7 +107,7 @@ NO_TANGENT = zeros(
 )
 
 
-joint_kernels = CompiledEntry(make_entry, __name__, n_records=5)
+joint_kernels = CompiledEntry(run, n_records=5)
 
 
 def call(

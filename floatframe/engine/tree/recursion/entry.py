@@ -5,9 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from fe_models.foundation.arrays import IntArray
-from floatframe.engine.kernels.compiler.choice import compiler
-from floatframe.engine.kernels.compiler.compilation import inner, kept_entry, loops, small
-from floatframe.engine.kernels.compiler.sources import source_digest
+from floatframe.engine.kernels.compiler.compilation import entry, inner, loops, small
 from floatframe.engine.kernels.compiler.structure import converter
 from floatframe.engine.kernels.marker import elastic_motion
 from floatframe.engine.kernels.model import Model
@@ -169,53 +167,45 @@ as_nodes, as_node_work, as_model = converter(Nodes()), converter(NodeWork()), co
 as_work, as_task, as_dense = converter(Work()), converter(Task()), converter(Dense())
 
 
-def make_entry(digest):
-    """Return the cached entry; the digest of the sources is part of its key."""
-
-    def run(nodes_table, work_table, dense_table, model_table, marker_table, task_table):
-        if digest == 0:
-            return -1
-        nodes, work, dense = as_nodes(nodes_table), as_node_work(work_table), as_dense(dense_table)
-        model, marker_work, task = as_model(model_table), as_work(marker_table), as_task(task_table)
-        for _ in range(task.times):
-            what = task.what
-            if what == FORWARD:
-                work.a[:] = 0.0
-            set_modes(nodes, work, marker_work.state)
-            place_in_parent(nodes, work, model, marker_work)
-            if what == INVERSE:
+@entry
+def run(nodes_table, work_table, dense_table, model_table, marker_table, task_table):
+    """Carry out a request; the arguments are the tables of the records."""
+    nodes, work, dense = as_nodes(nodes_table), as_node_work(work_table), as_dense(dense_table)
+    model, marker_work, task = as_model(model_table), as_work(marker_table), as_task(task_table)
+    for _ in range(task.times):
+        what = task.what
+        if what == FORWARD:
+            work.a[:] = 0.0
+        set_modes(nodes, work, marker_work.state)
+        place_in_parent(nodes, work, model, marker_work)
+        if what == INVERSE:
+            newton_euler(nodes, work, model, marker_work)
+        else:
+            if what == FORWARD or what == TANGENTS:
                 newton_euler(nodes, work, model, marker_work)
+                for j in range(work.right.shape[0]):
+                    work.right[j] = work.force_given[j] - work.force[j]
+            elif what == MASS or what == SOLVE:
+                evaluate_flexible(nodes, model, marker_work)
+            place_in_ground(nodes, work, marker_work)
+            rate_columns(nodes, work, model, marker_work)
+            if what == PLACE:
+                motion_in_ground(nodes, work)
+            elif what == TANGENTS:
+                motion_in_ground(nodes, work)
+                mass_matrix(nodes, work, dense.M, model, marker_work)
+                force_tangents(nodes, work, dense, model, marker_work)
+            elif what == MASS:
+                mass_matrix(nodes, work, dense.M, model, marker_work)
             else:
-                if what == FORWARD or what == TANGENTS:
-                    newton_euler(nodes, work, model, marker_work)
-                    for j in range(work.right.shape[0]):
-                        work.right[j] = work.force_given[j] - work.force[j]
-                elif what == MASS or what == SOLVE:
-                    evaluate_flexible(nodes, model, marker_work)
-                place_in_ground(nodes, work, marker_work)
-                rate_columns(nodes, work, model, marker_work)
-                if what == PLACE:
-                    motion_in_ground(nodes, work)
-                elif what == TANGENTS:
-                    motion_in_ground(nodes, work)
-                    mass_matrix(nodes, work, dense.M, model, marker_work)
-                    force_tangents(nodes, work, dense, model, marker_work)
-                elif what == MASS:
-                    mass_matrix(nodes, work, dense.M, model, marker_work)
+                singular = articulate(nodes, work, model, marker_work)
+                if singular >= 0:
+                    return singular
+                if what == FORWARD:
+                    solve_articulated(nodes, work)
                 else:
-                    singular = articulate(nodes, work, model, marker_work)
-                    if singular >= 0:
-                        return singular
-                    if what == FORWARD:
-                        solve_articulated(nodes, work)
-                    else:
-                        solve_columns(nodes, work, dense.columns)
-        return -1
-
-    return kept_entry(run)
-
-
-run = make_entry(source_digest(__name__, compiler))
+                    solve_columns(nodes, work, dense.columns)
+    return -1
 
 
 @dataclass(frozen=True, eq=False)

@@ -62,7 +62,7 @@ def test_a_notebook_shows_a_bar_while_code_is_compiled(is_stored, monkeypatch):
     shell = SimpleNamespace(get_ipython=lambda: SimpleNamespace(kernel=object()), display=display)
     monkeypatch.setitem(sys.modules, "IPython", shell)
     monkeypatch.setitem(sys.modules, "IPython.display", display)
-    run = entry.CompiledEntry(lambda digest: Compilation(is_stored), entry.__name__, 0)
+    run = entry.CompiledEntry(Compilation(is_stored), 0)
     run(what=0)
     run(what=0)
     if is_stored:
@@ -76,8 +76,7 @@ def test_a_notebook_shows_a_bar_while_code_is_compiled(is_stored, monkeypatch):
 
 @pytest.mark.parametrize("is_stored", [False, True])
 def test_python_too_is_told_once_that_code_is_being_compiled(is_stored, caplog):
-    compiled = Compilation(is_stored)
-    run = entry.CompiledEntry(lambda digest: compiled, entry.__name__, 0)
+    run = entry.CompiledEntry(Compilation(is_stored), 0)
     run(what=0)
     run(what=0)
     told = [record.levelname for record in caplog.records if "compiling the code of motions" in record.message]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from floatframe.engine.kernels.compiler.sources import PACKAGES, source_digest, source_files, syntax_of
+from fe_models.foundation.kernels.sources import PACKAGES, source_digest, source_files, syntax_of
 from tests.root import ROOT
 
 ENTRY = "floatframe.engine.kernels.entry"
@@ -190,7 +190,7 @@ def test_codes_that_change_elsewhere_reach_a_cached_function(tmp_path):
     (folder / "__init__.py").write_text("")
     (folder / "kernel.py").write_text(KERNEL)
     (folder / "codes.py").write_text("ADD, SUBTRACT = 1, 2\n")
-    sources = ROOT / "floatframe" / "engine" / "kernels" / "compiler" / "sources.py"
+    sources = ROOT / "fe_models" / "foundation" / "kernels" / "sources.py"
 
     def run() -> str:
         command = [sys.executable, "-m", "floatframe.kernel", str(sources)]

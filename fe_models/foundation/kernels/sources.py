@@ -14,9 +14,9 @@ from functools import cache
 from pathlib import Path
 from types import CodeType
 
-__all__ = ["imported_modules", "names_of", "source_digest", "source_files"]
+__all__ = ["PACKAGES", "ROOT", "digests", "imported_modules", "names_of", "source_digest", "source_files"]
 
-ROOT = Path(__file__).parents[4]  #: folder of the packages
+ROOT = Path(__file__).parents[3]  #: folder of the packages
 PACKAGES = ("cms", "fe_models", "floatframe")
 #: an import statement: module and names after `from`, or the imported modules
 STATEMENT = re.compile(
@@ -53,17 +53,22 @@ def source_digest(module: str, *extra: str, root: Path = ROOT) -> int:
     digest of the texts of the sources. If no file can be written, as in an installation of another user, the key is the
     digest of these texts.
     """
+    return digests(module, *extra, root=root)[0]
+
+
+def digests(module: str, *extra: str, root: Path = ROOT) -> tuple[int, int]:
+    """Return the key of the syntax (`source_digest`), and one that changes with every byte of the same sources."""
     texts = {path.relative_to(root).as_posix(): path.read_bytes() for path in source_files(module, root)}
     whole = digest_of(extra, texts)
     record = record_of(root, module, extra)
     try:
         read, key = record.read_text(encoding="ascii").split()
         if read == f"{whole:x}":
-            return int(key, 16)
+            return int(key, 16), whole
     except (OSError, ValueError):  # there is no record yet, or it is incomplete
         pass
     key_of_syntax = digest_of(extra, {name: syntax_of(text) for name, text in texts.items()})
-    return key_of_syntax if keep(record, f"{whole:x} {key_of_syntax:x}") else whole
+    return key_of_syntax if keep(record, f"{whole:x} {key_of_syntax:x}") else whole, whole
 
 
 def digest_of(extra: tuple[str, ...], texts: dict[str, bytes]) -> int:
