@@ -3,14 +3,11 @@
 Numba compiles the kernels once per machine and caches them, each part on one core. A separate process can compile while
 another core does other work. Kernels have a single signature, so any system compiles all kernels of a part. The last
 printed line reports the result as JSON: `{"compiled": true, "from_package": false, "seconds": 12.3}`.
-
-With `--into FOLDER` and no parts, all are compiled, and their code is also written as the files that a package can
-bring along (fe_models/foundation/kernels/jit.py); `.ci/wheel` does this for each family of processors.
 """
 
-import argparse
 import json
 import logging
+import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -95,7 +92,11 @@ PARTS: dict[str, tuple[str, Callable[[], None]]] = {
 
 
 def main(parts: Sequence[str] = (), into: Path | None = None) -> None:
-    """Compile the parts, and report whether anything was compiled or came with the package; `into`: see above."""
+    """Compile the parts, and report whether anything was compiled or came with the package.
+
+    With a folder `into`, all parts are compiled, and their code is written there as files that a package can bring
+    along (fe_models/foundation/kernels/jit.py); `.ci/wheel` does this for each family of processors.
+    """
     began, jit.write_into = time.perf_counter(), into
     with install_recorder("numba:compile") as recorder:
         for part in parts or (PARTS if into else ("motion",)):
@@ -106,7 +107,4 @@ def main(parts: Sequence[str] = (), into: Path | None = None) -> None:
 
 if __name__ == "__main__":
     logging.disable(logging.WARNING)  # they would say that this can be done in advance
-    parser = argparse.ArgumentParser()
-    parser.add_argument("parts", nargs="*")
-    parser.add_argument("--into", type=Path)
-    main(**vars(parser.parse_args()))
+    main(sys.argv[1:])

@@ -59,14 +59,14 @@ keys_of_module = cache(digests)
 
 def jit_with(**options: Any) -> Callable[[Callable], Any]:
     """Return the decorator of kernels with options of numba; the code is stored, see the docstring of the module."""
-    compiled = njit(**{"nogil": True, "error_model": "numpy"} | options)
+    compiled: Any = njit(**{"nogil": True, "error_model": "numpy"} | options)  # type: ignore[call-overload]
     return lambda function: stored(compiled(function))
 
 
 def stored(compiled: Any) -> Any:
     """Return a function of numba whose code is stored on disk; a function that numba may not compile stays as it is."""
     if isinstance(compiled, Dispatcher):
-        compiled._cache = KernelCache(compiled)
+        compiled._cache = KernelCache(compiled)  # type: ignore[attr-defined]
     return compiled
 
 
@@ -102,13 +102,13 @@ class KernelCache(NullCache):
         """The folder of numba's cache."""
         return self.own.cache_path
 
-    def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the code for a signature, None if it must be compiled."""
         target_context.refresh()
         code = self.own.load_overload(sig, target_context)
         return self.shipped(sig, target_context) if code is None else code
 
-    def shipped(self, sig: Any, target_context: Any) -> CompileResult | None:
+    def shipped(self, sig: Any, target_context: Any) -> Any:
         """Return the code that came with the package for this processor; None if there is none or it is damaged."""
         if self.words is None or write_into is not None:
             return None
@@ -134,7 +134,7 @@ class KernelCache(NullCache):
         """Return the name of the file for a signature."""
         return hashlib.sha256(repr((self.words, str(sig), codegen.magic_tuple()[0])).encode()).hexdigest()[:DIGEST]
 
-    def save_overload(self, sig: Any, data: CompileResult) -> None:
+    def save_overload(self, sig: Any, data: Any) -> None:
         """Store compiled code."""
         self.own.save_overload(sig, data)
         if write_into is not None and self.words is not None and not data.library.has_dynamic_globals:
