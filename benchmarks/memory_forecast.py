@@ -1,7 +1,7 @@
 """The forecast of memory beside what a reduction took: `cms reduce --memory`, a process each.
 
     python -m benchmarks.memory_forecast                    # rods of 50k and 160k dofs
-    python -m benchmarks.memory_forecast 300k 475k          # larger ones
+    python -m benchmarks.memory_forecast 300k 475k          # larger ones; 1M and 2M too
     python -m benchmarks.memory_forecast interfaces         # the body of benchmarks.interface_rich, 2043 boundary dofs
     python -m benchmarks.memory_forecast 160k 1.8GB         # with a budget, here one that takes the factor to disk
     python -m benchmarks.memory_forecast 160k threads=2     # of BLAS and of our own loops
@@ -21,7 +21,7 @@ from pathlib import Path
 from benchmarks.records import print_record, record_in
 from benchmarks.rods import OUT, rod_file
 
-RODS = {"50k": 3.76, "160k": 2.44, "300k": 1.91, "475k": 1.62}  #: element size [mm]
+RODS = {"50k": 3.76, "160k": 2.44, "300k": 1.91, "475k": 1.62, "1M": 1.24, "2M": 0.972}  #: element size [mm]
 AMPLE = "22GB"  #: a budget that keeps all in core
 EVERY = 0.002  #: s between two looks at the resident size
 

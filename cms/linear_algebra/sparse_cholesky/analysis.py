@@ -20,6 +20,8 @@ LEAF = 12  #: number of vertices (mostly mesh nodes) up to which a part is not d
 MANY = 5000  #: number of vertices above which parts of a graph are dissected in parallel
 SHARES = 8  #: parts that are dissected in parallel have at most 1 / SHARES of all vertices
 FEW = 24  #: number of columns up to which small fronts are always merged, whatever zeros this adds
+SIMILAR = 0.7  #: share of common neighbours from which consecutive vertices are merged; below 0.66 at adjacent nodes
+FEWER = 0.9  #: ratio of the numbers of vertices below which they are merged
 SHARE = 0.5  #: allowed share of zeros in a merged front with about `FEW` columns; smaller in larger fronts
 
 
@@ -144,6 +146,9 @@ def nested_dissection(start: IntArray, neighbours: IntArray, weight: IntArray) -
 def quotient(lower: sp.csc_array) -> "tuple[IntArray, IntArray, IntArray, IntArray]":
     """Return the graph of a matrix in which rows with equal neighbours form one vertex.
 
+    The rows of a node may differ, because entries of regular meshes that cancel are not stored. Consecutive vertices
+    with similar neighbours are therefore merged, with the neighbours of both, as long as this leaves far fewer.
+
     Returns
     -------
     start, neighbours
@@ -163,7 +168,21 @@ def quotient(lower: sp.csc_array) -> "tuple[IntArray, IntArray, IntArray, IntArr
     group = rank[group].astype(np.int32)
     representative = np.sort(representative)
     start, neighbours = kernels.graph_of(lower.indptr, lower.indices, representative, group)
+    while (run := kernels.runs_of_similar(start, neighbours, SIMILAR))[-1] + 1 < FEWER * len(run):
+        start, neighbours = contracted(start, neighbours, run)
+        group = run[group].astype(np.int32)
     return start, neighbours, np.bincount(group), group
+
+
+def contracted(start: IntArray, neighbours: IntArray, run: IntArray) -> "tuple[IntArray, IntArray]":
+    """Return the graph with one vertex for each run of vertices, whose neighbours are those of all of them."""
+    n = int(run[-1]) + 1
+    ends = np.repeat(run, np.diff(start)), run[neighbours]
+    is_edge = ends[0] != ends[1]
+    rows, columns = ends[0][is_edge], ends[1][is_edge]
+    graph = sp.csr_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(n, n))
+    graph.sum_duplicates()
+    return graph.indptr.astype(np.int64), graph.indices.astype(np.int32)
 
 
 def renumbered(start: IntArray, neighbours: IntArray, order: IntArray) -> "tuple[IntArray, IntArray]":

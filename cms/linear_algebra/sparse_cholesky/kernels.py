@@ -62,6 +62,31 @@ def graph_of(indptr, indices, representative, group):
 
 
 @jit
+def runs_of_similar(start, neighbours, share):
+    """Return the run of each vertex, (n,): consecutive vertices that have a share of all their neighbours in common.
+
+    The share is that of the common neighbours in all neighbours of a vertex and of the first one of the run; a vertex
+    is its own neighbour.
+    """
+    n = start.size - 1
+    run, of_first = np.zeros(n, np.int64), np.full(n, -1, np.int64)
+    first = -1
+    for a in range(n):
+        common = 1 if first >= 0 and of_first[a] == first else 0
+        for e in range(start[a], start[a + 1]):
+            common += 1 if first >= 0 and of_first[neighbours[e]] == first else 0
+        n_both = start[a + 1] - start[a] + start[first + 1] - start[first] + 2 - common
+        if first >= 0 and common >= share * n_both:
+            run[a] = run[a - 1]
+            continue
+        run[a], first = run[a - 1] + 1 if a else 0, a
+        of_first[a] = a
+        for e in range(start[a], start[a + 1]):
+            of_first[neighbours[e]] = a
+    return run
+
+
+@jit
 def elimination_tree(start, neighbours):
     """Return the parent of each column of the factor, (n,), -1 for roots; vertices are in elimination order."""
     n = start.size - 1
