@@ -169,20 +169,9 @@ def quotient(lower: sp.csc_array) -> "tuple[IntArray, IntArray, IntArray, IntArr
     representative = np.sort(representative)
     start, neighbours = kernels.graph_of(lower.indptr, lower.indices, representative, group)
     while (run := kernels.runs_of_similar(start, neighbours, SIMILAR))[-1] + 1 < FEWER * len(run):
-        start, neighbours = contracted(start, neighbours, run)
+        start, neighbours = kernels.contracted(start, neighbours, run)
         group = run[group].astype(np.int32)
     return start, neighbours, np.bincount(group), group
-
-
-def contracted(start: IntArray, neighbours: IntArray, run: IntArray) -> "tuple[IntArray, IntArray]":
-    """Return the graph with one vertex for each run of vertices, whose neighbours are those of all of them."""
-    n = int(run[-1]) + 1
-    ends = np.repeat(run, np.diff(start)), run[neighbours]
-    is_edge = ends[0] != ends[1]
-    rows, columns = ends[0][is_edge], ends[1][is_edge]
-    graph = sp.csr_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(n, n))
-    graph.sum_duplicates()
-    return graph.indptr.astype(np.int64), graph.indices.astype(np.int32)
 
 
 def renumbered(start: IntArray, neighbours: IntArray, order: IntArray) -> "tuple[IntArray, IntArray]":

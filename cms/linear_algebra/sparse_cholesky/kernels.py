@@ -87,6 +87,32 @@ def runs_of_similar(start, neighbours, share):
 
 
 @jit
+def contracted(start, neighbours, run):
+    """Return the graph with one vertex for each run of vertices, whose neighbours are those of all of them, sorted."""
+    n = run[-1] + 1
+    begin, seen = np.zeros(n + 2, np.int64), np.empty(n, np.int64)
+    for fill in range(2):
+        if fill:
+            for a in range(2, n + 2):
+                begin[a] += begin[a - 1]  # begin[1] is zero
+            found = np.empty(begin[n + 1], np.int32)
+        seen[:] = -1
+        for k in range(run.size):
+            a = run[k]
+            for e in range(start[k], start[k + 1]):
+                b = run[neighbours[e]]
+                if b == a or seen[b] == a:
+                    continue
+                seen[b] = a
+                if fill:
+                    found[begin[b + 1]] = a
+                    begin[b + 1] += 1
+                else:
+                    begin[b + 2] += 1
+    return begin[: n + 1], found
+
+
+@jit
 def elimination_tree(start, neighbours):
     """Return the parent of each column of the factor, (n,), -1 for roots; vertices are in elimination order."""
     n = start.size - 1
