@@ -41,6 +41,7 @@ def print_body(body: "ReducedBody", *, everything: bool = False, has_warned: boo
     """
     from cms.assessment.quality.body_record import body_record, body_size
     from cms.body.reduced_body import unit_findings
+    from cms.reduction.basis.damping import for_readers
 
     record = body_record(body)
     length, mass, inertia = (
@@ -123,8 +124,9 @@ def print_body(body: "ReducedBody", *, everything: bool = False, has_warned: boo
             ],
         )
     if everything:
-        width = max(map(len, record["provenance"]), default=0)
-        say("\n".join(("Provenance", *(f"{key:<{width}}  {words}" for key, words in record["provenance"].items()))))
+        rows = record["provenance"] | {"damping": for_readers(record["provenance"].get("damping", "none"))}
+        width = max(map(len, rows))
+        say("\n".join(("Provenance", *(f"{key:<{width}}  {words}" for key, words in rows.items()))))
 
 
 def print_free_frequencies(record: Any) -> None:
