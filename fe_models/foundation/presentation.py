@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-import scipy.sparse as sp
 
 from fe_models.foundation.words import shortened
 
@@ -125,6 +124,8 @@ def is_same(a: Any, b: Any) -> bool:
 
 def text_of(value: Any) -> str:
     """Return a value as a short text on one line."""
+    import scipy.sparse as sp  # not above: drawing processes have no matrices
+
     if isinstance(value, np.ndarray):
         if not 0 < value.size <= SMALL_ARRAY:
             return f"array {value.shape}"

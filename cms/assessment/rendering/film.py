@@ -45,10 +45,15 @@ def require_suffix(path: Path, suffixes: tuple[str, ...]) -> None:
 
 
 def average_of_blocks(image: Image, n: int) -> Image:
-    """Return an image, (n height, n width, >= 3) uint8, averaged over blocks of n by n pixels, which smooths edges."""
+    """Return an image averaged over blocks of n by n pixels, which smooths edges, without its opacity.
+
+    The given one is (n height, n width, 4) uint8, the other (height, width, 3).
+    """
     from PIL import Image as PilImage
 
-    return np.asarray(PilImage.fromarray(np.ascontiguousarray(image[..., :3])).reduce(n))
+    height, width = image.shape[:2]
+    whole = PilImage.frombuffer("RGBX", (width, height), np.ascontiguousarray(image), "raw", "RGBX", 0, 1)
+    return np.asarray(whole.reduce(n).convert("RGB"))
 
 
 def write_picture(image: Image, path: Path) -> None:
