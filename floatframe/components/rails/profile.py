@@ -7,14 +7,16 @@ flange is at y < 0, with values of about +28 mm. The profile of a rail is its he
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline, make_smoothing_spline
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.records import frozen_copies
 from floatframe.errors import ModelError
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 __all__ = ["Profile", "profile_of_points"]
 
@@ -49,8 +51,10 @@ class Profile:
             object.__setattr__(self, name, values)
 
     @cached_property
-    def spline(self) -> CubicSpline:
+    def spline(self) -> "CubicSpline":
         """The spline through the points."""
+        from scipy.interpolate import CubicSpline  # a quarter of a second, where only the keys of a wheel are asked for
+
         return CubicSpline(self.y, self.z, bc_type="natural")
 
     def height(self, y: Array) -> Array:
@@ -124,6 +128,8 @@ def profile_of_points(
     spacing
         Spacing of the points that represent the smooth curve [m].
     """
+    from scipy.interpolate import CubicSpline, make_smoothing_spline
+
     where = f"profile {name!r}"
     y, z = checked_points(where, kind, y, z)
     if noise is not None and not (np.isfinite(noise) and noise >= 0):
@@ -141,6 +147,8 @@ def profile_of_points(
 
 def smoothed_to_noise(y: Array, z: Array, noise: float) -> Any:
     """Return the smoothing spline with residual `noise`; the residual grows with lam, whose logarithm is bisected."""
+    from scipy.interpolate import make_smoothing_spline
+
     low, high = -12.0, 8.0
     for _ in range(50):
         middle = 0.5 * (low + high)
