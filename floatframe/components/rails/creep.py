@@ -7,8 +7,9 @@ imaginary axis gives derivatives); comparisons use real parts.
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
+
+from fe_models.foundation.kernels.jit import jit
 
 __all__ = [
     "N_CREEP_INPUTS",
@@ -52,7 +53,7 @@ class Patch(NamedTuple):
 SMALL = 1e-8  #: creepage below which the direction in Polach's law is smoothed
 
 
-@numba.njit(cache=True)
+@jit
 def linear_creep(creepage, patch, options):
     """Return Kalker's linear forces, without a friction limit."""
     (xi, eta, phi), G = creepage, patch.G
@@ -65,7 +66,7 @@ def linear_creep(creepage, patch, options):
     )
 
 
-@numba.njit(cache=True)
+@jit
 def saturated_creep(creepage, patch, options):
     """Return the linear forces, with resultant F limited to mu N (e - e²/3 + e³/27), e = F/(mu N) <= 3 (Shen 1983)."""
     fx, fy, m = linear_creep(creepage, patch, options)
@@ -78,7 +79,7 @@ def saturated_creep(creepage, patch, options):
     return fx * factor, fy * factor, m * factor
 
 
-@numba.njit(cache=True)
+@jit
 def polach(creepage, patch, options, V):
     """Return Polach's forces (1999, 2005); options = (k_A, k_S, A, B), V the rolling speed.
 
@@ -117,7 +118,7 @@ def polach(creepage, patch, options, V):
     return fx, fy, 0 * fx
 
 
-@numba.njit(cache=True)
+@jit
 def fastsim_of_flexibilities(creepage, patch, flexibilities, cells):
     """Return the forces of Kalker's simplified theory (1982) with flexibilities (L1, L2, L3) [m³/N].
 
@@ -170,7 +171,7 @@ def fastsim_of_flexibilities(creepage, patch, flexibilities, cells):
     return fx, fy, m
 
 
-@numba.njit(cache=True)
+@jit
 def fastsim(creepage, patch, options):
     """Return FASTSIM's forces with flexibilities from the linear coefficients; options = (cells along, strips).
 
@@ -185,7 +186,7 @@ def fastsim(creepage, patch, options):
     return fastsim_of_flexibilities(creepage, patch, (L1, L2, L3), cells)
 
 
-@numba.njit(cache=True)
+@jit
 def creep_force(law, creepage, patch, options, V):
     """Return (F_x, F_y, M) at a rolling speed V, by the law with a number in `CREEP_LAWS`."""
     if law == 0:
@@ -197,7 +198,7 @@ def creep_force(law, creepage, patch, options, V):
     return fastsim(creepage, patch, options)
 
 
-@numba.njit(cache=True)
+@jit
 def creep_slopes(law, creepage, patch, options, V, slopes):
     """Return `creep_force`; write its derivatives by xi, eta, phi, N, a, b, c11 to c33, V to slopes, (3, 11)."""
     if law == 3:
@@ -214,7 +215,7 @@ def creep_slopes(law, creepage, patch, options, V, slopes):
     return fx.real, fy.real, m.real
 
 
-@numba.njit(cache=True)
+@jit
 def fastsim_slopes(creepage, patch, options, slopes):
     """Return the forces of `fastsim`; write their derivatives to slopes, see `creep_slopes`.
 
@@ -290,7 +291,7 @@ def fastsim_slopes(creepage, patch, options, slopes):
     return f[0, 0], f[0, 1], f[0, 2]
 
 
-@numba.njit(cache=True)
+@jit
 def add_forces(f, factor, fx, fy, m):
     """Add the forces and the moment of a strip, times a factor, to f, (3,)."""
     f[0] += factor * fx

@@ -15,9 +15,9 @@ For each wheel, with side = +1 on the left and -1 on the right, and outward = si
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
+from fe_models.foundation.kernels.jit import jit
 from floatframe.components.rails.creep import Creepage, Patch, creep_force
 from floatframe.components.rails.splines import basis, basis_slopes, cell
 from floatframe.model.elements.pairs import inner_product, vector_product
@@ -70,13 +70,13 @@ GAUSS_X = np.polynomial.legendre.leggauss(4)[0]
 GAUSS_W = np.polynomial.legendre.leggauss(4)[1]
 
 
-@numba.njit(cache=True)
+@jit
 def along_cell(data, at, x, y):
     """Return the distance of a point ahead of the start of a cell, along the tangent at the start."""
     return (x - data[at + 1]) * np.cos(data[at + 3]) + (y - data[at + 2]) * np.sin(data[at + 3])
 
 
-@numba.njit(cache=True)
+@jit
 def place_on_track(data, x, y):
     """Return the track at its nearest point: s, origin (x, y), heading, cant, curvature, first of its cell."""
     cells, n = int(data[14]), int(data[15])
@@ -121,7 +121,7 @@ def place_on_track(data, x, y):
     return data[at] + d, ox, oy, psi, data[at + 6] + data[at + 7] * d, k_0 + slope * d, at
 
 
-@numba.njit(cache=True)
+@jit
 def deviation(data, signal, s):
     """Return a deviation of the rails at s and its slope, for the signals left y, left z, right y, right z."""
     at, n = int(data[16]), int(data[19])
@@ -138,7 +138,7 @@ def deviation(data, signal, s):
     return value, slope
 
 
-@numba.njit(cache=True)
+@jit
 def contact_fields(data, table, v, roll, sine, field):
     """Write the fields of all parts at a shift v = u + r_0 roll, a sine of the roll and a sine of the yaw."""
     n_v, n_r, n_y, n_f = int(data[table]), int(data[table + 3]), int(data[table + 6]), int(data[table + 8])
@@ -159,7 +159,7 @@ def contact_fields(data, table, v, roll, sine, field):
                 field[f] += w * ((y_0 * row_0[f] + y_1 * row_1[f]) + (y_2 * row_2[f] + y_3 * row_3[f]))
 
 
-@numba.njit(cache=True)
+@jit
 def four_rows(data, at, n):
     """Return four rows of n numbers, one after the other, that begin at an index."""
     return data[at : at + n], data[at + n : at + 2 * n], data[at + 2 * n : at + 3 * n], data[at + 3 * n : at + 4 * n]
@@ -195,7 +195,7 @@ class Contact(NamedTuple):
     e: tuple  #: transverse direction
 
 
-@numba.njit(cache=True)
+@jit
 def combined(x, a, y, b, z, c):
     """Return x a + y b + z c of three vectors."""
     return (
@@ -205,13 +205,13 @@ def combined(x, a, y, b, z, c):
     )
 
 
-@numba.njit(cache=True)
+@jit
 def vector_sum(a, b):
     """Return a + b of two vectors."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
-@numba.njit(cache=True)
+@jit
 def place_of_wheel(data, wheel, r, axle):
     """Return the place of a wheel for the position of the marker and the direction of the axle."""
     at = N_HEAD + wheel * N_WHEEL
@@ -234,7 +234,7 @@ def place_of_wheel(data, wheel, r, axle):
     return Place(s, at_cell, t, n, b, d, k, stretch, slope_y * stretch, slope_z * stretch, v, h, roll, sine)
 
 
-@numba.njit(cache=True)
+@jit
 def contact_of_part(field, place, side, arm, axle):
     """Return the contact of a part of a wheel with these fields."""
     slope = field[1]
@@ -248,7 +248,7 @@ def contact_of_part(field, place, side, arm, axle):
     return Contact(cos, sin, depth, P, m, e)
 
 
-@numba.njit(cache=True)
+@jit
 def spin_of_wheels(z, inertia, omega, axle):
     """Return the angular velocity of the wheels: that of the marker or, with an inertia, the state about the axle."""
     if inertia > 0:
@@ -257,7 +257,7 @@ def spin_of_wheels(z, inertia, omega, axle):
     return omega
 
 
-@numba.njit(cache=True)
+@jit
 def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write the wrench of all wheels of the element on its marker, see the module docstring."""
     n_parts = int(data[1])

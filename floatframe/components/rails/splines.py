@@ -1,10 +1,10 @@
 """Uniform cubic B-splines: coefficients in NumPy, values in compiled code for float64 and complex128 arguments."""
 
-import numba
 import numpy as np
 from scipy.linalg import solve_banded
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.kernels.jit import jit
 
 __all__ = [
     "basis",
@@ -46,7 +46,7 @@ def coefficients(values: Array, axis: int = 0) -> Array:
     return np.moveaxis(c.reshape(n + 2, *shape), 0, axis)
 
 
-@numba.njit(cache=True)
+@jit
 def cell(x, start, step, n):
     """Return the interval i of n points and the position t in it, 0 to 1; clamped beyond the ends."""
     place = (x - start) / step
@@ -58,28 +58,28 @@ def cell(x, start, step, n):
     return i, place - i
 
 
-@numba.njit(cache=True)
+@jit
 def cell_slope(x, start, step, n):
     """Return the derivative of the position t in `cell` by x, which is zero beyond the ends."""
     place = (x - start) / step
     return 1 / step if 0.0 < place < n - 1 else 0.0
 
 
-@numba.njit(cache=True)
+@jit
 def basis(t):
     """Return the four weights of the coefficients i, i + 1, i + 2, i + 3 at t."""
     s = 1 - t
     return s * s * s / 6, (3 * t * t * t - 6 * t * t + 4) / 6, (3 * s * s * s - 6 * s * s + 4) / 6, t * t * t / 6
 
 
-@numba.njit(cache=True)
+@jit
 def basis_slopes(t):
     """Return the derivatives of `basis` by t."""
     s = 1 - t
     return -s * s / 2, (3 * t * t - 4 * t) / 2, -(3 * s * s - 4 * s) / 2, t * t / 2
 
 
-@numba.njit(cache=True)
+@jit
 def basis_curvatures(t):
     """Return the second derivatives of `basis` by t."""
     s = 1 - t

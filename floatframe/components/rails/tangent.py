@@ -7,9 +7,9 @@ nearest point ds = t·dW/(1 - k beside), with the distance beside the track in t
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
+from fe_models.foundation.kernels.jit import jit
 from floatframe.components.rails.creep import N_CREEP_INPUTS, Creepage, Patch, creep_slopes
 from floatframe.components.rails.law import (
     N_FIELDS,
@@ -41,7 +41,7 @@ class Step(NamedTuple):
     wheel: int  #: the wheel whose multiplier changes by one, or below zero
 
 
-@numba.njit(cache=True)
+@jit
 def unit_step(axle, column, n_states):
     """Return the change of the inputs for a unit change of variable `column`."""
     kind, i = column // 3, column % 3
@@ -58,7 +58,7 @@ def unit_step(axle, column, n_states):
     )
 
 
-@numba.njit(cache=True)
+@jit
 def deviation_curvature(data, signal, s):
     """Return the second derivative of a deviation of the rails at s."""
     at, n = int(data[16]), int(data[19])
@@ -71,7 +71,7 @@ def deviation_curvature(data, signal, s):
     return (w0 * data[at] + w1 * data[at + 4] + w2 * data[at + 8] + w3 * data[at + 12]) * per * per
 
 
-@numba.njit(cache=True)
+@jit
 def contact_field_slopes(data, table, v, roll, sine, by_v, by_roll, by_sine):
     """Write the derivatives of `contact_fields` by shift, roll and sine of the yaw."""
     n_v, n_r, n_y, n_f = int(data[table]), int(data[table + 3]), int(data[table + 6]), int(data[table + 8])
@@ -112,7 +112,7 @@ class PlaceStep(NamedTuple):
     sine: float
 
 
-@numba.njit(cache=True)
+@jit
 def place_step(data, wheel, place, axle, step):
     """Return the change of the place of a wheel, equations (1) and (2)."""
     at = N_HEAD + wheel * N_WHEEL
@@ -140,7 +140,7 @@ def place_step(data, wheel, place, axle, step):
     return PlaceStep(dt, dn, db, along_y, along_z, v, by_b - place.along_z / stretch * ds, roll, sine)
 
 
-@numba.njit(cache=True)
+@jit
 def contact_step(field, fields, place, moved, contact, side, arm, step):
     """Return the change of a `Contact`, equation (3), for changes `fields` of the fields and `moved` of the place."""
     cos, sin = contact.cos, contact.sin
@@ -161,7 +161,7 @@ def contact_step(field, fields, place, moved, contact, side, arm, step):
     return Contact(d_cos, d_sin, depth, P, m, e)
 
 
-@numba.njit(cache=True)
+@jit
 def spin_step(z, inertia, omega, axle, step):
     """Return the change of the angular velocity of the wheels."""
     if inertia > 0:
@@ -171,7 +171,7 @@ def spin_step(z, inertia, omega, axle, step):
     return step.omega
 
 
-@numba.njit(cache=True)
+@jit
 def creep_slopes_of_contact(inputs, by_place, by_inputs, slopes):
     """Write the derivatives of creep forces by xi, eta, phi, N, V, shift, roll and sine of the yaw, (3, 8).
 
@@ -189,7 +189,7 @@ def creep_slopes_of_contact(inputs, by_place, by_inputs, slopes):
             slopes[r, 5 + p] = total
 
 
-@numba.njit(cache=True)
+@jit
 def tangent_of_wheels(t, x, z, lam, data, slopes):
     """Write the derivatives of `law.wheels_on_rails`: a tangent, see `floatframe.model.elements.element`."""
     law, options, inertia, n_states = int(data[2]), data[3:8], data[20], z.shape[0]
