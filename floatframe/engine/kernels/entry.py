@@ -175,7 +175,9 @@ class CompiledEntry:
         rows = new_rows(records[0], (first + n_steps) // every - first // every)
         steps = {"h": h, "first": first, "n_steps": n_steps, "every": every}
         outcome = self(*records, memory=memory, rows=rows, what=ADVANCE, **steps, **order)
-        return Rows(*(array[: outcome.n_rows] for array in rows)), outcome
+        if outcome.n_rows < len(rows.t):
+            rows = Rows(*(array[: outcome.n_rows] for array in rows))
+        return rows, outcome
 
 
 absolute_kernels = CompiledEntry(run, n_records=2)

@@ -4,6 +4,7 @@ A `State` is what a user gives and gets; a `Memory` is the complete state of a m
 memory, restart records store one, and a block of steps stores the memory after each step (`work.Past`).
 """
 
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -135,7 +136,7 @@ def state_sizes(model: Model) -> dict[str, int]:
 
 
 def new_rows(model: Model, n_t: int) -> Rows:
-    """Return empty results for n_t output times."""
+    """Return results of zeros for n_t output times; those for none are shared."""
     sizes = {
         "n_c": len(model.connections.size),
         "n_t": n_t,
@@ -143,4 +144,11 @@ def new_rows(model: Model, n_t: int) -> Rows:
         "loads": len(model.loads.marker),
         "body loads": len(model.body_loads.body),
     }
-    return zeros(Rows(), state_sizes(model) | sizes)
+    sizes = state_sizes(model) | sizes
+    return zeros(Rows(), sizes) if n_t > 0 else no_rows(tuple(sizes.items()))
+
+
+@lru_cache(maxsize=64)
+def no_rows(sizes: tuple[tuple[str, int], ...]) -> Rows:
+    """Return results for no output time."""
+    return zeros(Rows(), dict(sizes))

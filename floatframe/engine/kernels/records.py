@@ -125,7 +125,7 @@ def stacked(declaration: Record, size: Size) -> Record:
 class Layout:
     """Positions of the arrays of a record in one block of memory."""
 
-    arrays: tuple[tuple[type, tuple[int, ...], int], ...]  #: number type, shape and first byte of each array
+    arrays: tuple[tuple[tuple[int, ...], np.dtype[Any], int], ...]  #: shape, number type and first byte of each array
     n_words: int
     table: IntArray  #: table of the record for a block at address 0
     addresses: IntArray  #: indices of the addresses in the table
@@ -135,13 +135,13 @@ class Layout:
 def layout_of(kind: type[Any], sizes: tuple[tuple[str, int], ...]) -> Layout:
     """Return the layout of a record in which each array begins at a cache line."""
     known = dict(sizes)
-    arrays: list[tuple[type, tuple[int, ...], int]] = []
+    arrays: list[tuple[tuple[int, ...], np.dtype[Any], int]] = []
     table: list[int] = []
     addresses: list[int] = []
     n_words = 0
     for each in declarations(kind()):
         shape = tuple(size.of(known) if isinstance(size, Size) else size for size in each.shape)
-        arrays.append((each.dtype, shape, WORD * n_words))
+        arrays.append((shape, np.dtype(each.dtype), WORD * n_words))
         addresses.append(len(table))
         table += [WORD * n_words, *shape]
         n_words += -(-prod(shape) // LINE) * LINE
@@ -154,8 +154,9 @@ def zeros(declaration: Record, sizes: Mapping[str, int]) -> Record:
     block = np.zeros(layout.n_words + LINE)
     address = block.__array_interface__["data"][0]
     shift = -address % (WORD * LINE)  # bytes up to the first cache line
-    arrays = (np.ndarray(shape, dtype, block, shift + first) for dtype, shape, first in layout.arrays)
-    made = grouped(declaration, arrays)
+    arrays = [np.ndarray(shape, dtype, block, shift + first) for shape, dtype, first in layout.arrays]
+    is_flat = len(arrays) == len(declaration)
+    made = type(declaration)._make(arrays) if is_flat else grouped(declaration, iter(arrays))
     if isinstance(made, Tabled):
         made.table = layout.table.copy()
         made.table[layout.addresses] += address + shift

@@ -8,6 +8,7 @@ kernel runs, so that they may be kept in registers.
 """
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 from llvmlite import ir
@@ -120,14 +121,26 @@ def converter(declaration):
     return convert
 
 
+@lru_cache
+def numbers_of(record) -> tuple[dict[str, tuple[int, bool]], IntArray]:
+    """Return the index of each number of a class of records, whether it is an integer, and addresses from the first."""
+    declared = record()._asdict()
+    places = {name: (k, each.dtype is np.int64) for k, (name, each) in enumerate(declared.items())}
+    return places, 8 * np.arange(len(places))
+
+
 def table_of_numbers(declaration, values: Mapping[str, float]) -> tuple[IntArray, Array]:
     """Return the table of a record of numbers, zero if not given, and the numbers, which the caller must keep alive."""
-    reals = np.zeros(len(declaration))
+    places, offsets = numbers_of(type(declaration))
+    reals = np.zeros(len(places))
     integers = reals.view(np.int64)
     for name, value in values.items():
-        declared = getattr(declaration, name, None)
-        if declared is None:
-            unknown = ", ".join(name for name in values if name not in declaration._fields)
+        if name not in places:
+            unknown = ", ".join(name for name in values if name not in places)
             raise TypeError(f"{type(declaration).__name__} has no numbers {unknown}")
-        (integers if declared.dtype is np.int64 else reals)[declaration._fields.index(name)] = value
-    return reals.ctypes.data + reals.itemsize * np.arange(len(declaration)), reals
+        index, is_integer = places[name]
+        if is_integer:
+            integers[index] = value
+        else:
+            reals[index] = value
+    return reals.__array_interface__["data"][0] + offsets, reals
