@@ -85,12 +85,12 @@ def without_noise(x: Array, bound: Array) -> Array:
 def blocks_of(expansion: Expansion, i: int) -> dict[int, Array]:
     """Return the numbers of body i by their names in `kernels.model`; missing geometric stiffness is zero."""
     model = expansion.compiled.model
-    n, is_stiffened = int(model.bodies.n_q[i]), bool(model.body_types.is_stiffened[model.bodies.kind[i]])
+    n, has_unit_loads = int(model.bodies.n_q[i]), bool(model.body_types.has_unit_loads[model.bodies.kind[i]])
     blocks = {which: modal_matrix(model, i, which) for which in (MASS, STIFFNESS, DAMPING)}
     for which, shape in ((C1, (3, n)), (C3, (3, 3, n)), (S_AB, (n, 3, 3, n)), (C4, (n, 3, n))):
         blocks[which] = stored_array(model, i, which, *shape)
     for which in (K_TRANSLATION, K_ROTATION):
-        blocks[which] = stored_array(model, i, which, n, 3, n) if is_stiffened else np.zeros((n, 3, n))
+        blocks[which] = stored_array(model, i, which, n, 3, n) if has_unit_loads else np.zeros((n, 3, n))
     return blocks
 
 

@@ -81,7 +81,7 @@ def type_arrays(types: list[RigidBody | ReducedBody]) -> BodyTypes:
     blocks: list[Array] = []
     block0 = np.zeros((len(types), N_BLOCKS), np.int64)
     is_diagonal = np.ones((len(types), 3), np.int64)
-    is_stiffened = np.zeros(len(types), np.int64)
+    has_unit_loads = np.zeros(len(types), np.int64)
     mass, S, J0 = [], [], []
     n = 0
     for t, body in enumerate(types):
@@ -101,11 +101,11 @@ def type_arrays(types: list[RigidBody | ReducedBody]) -> BodyTypes:
         S_kl = moments.S_kl
         unit_loads: list[Array] = []
         if body.geometric is not None and body.n_q > 0:
-            is_stiffened[t] = 1
             S_kl = stiffened_shape_moments(S_kl, body.geometric)
             unit_loads = [
                 np.moveaxis(K, 2, 0) for K in (body.geometric.translation, body.geometric.rotation)
             ]  # [l, a, k]
+            has_unit_loads[t] = any(np.any(K) for K in unit_loads)
         parts = [
             moments.C1,
             moments.C2,
@@ -128,5 +128,5 @@ def type_arrays(types: list[RigidBody | ReducedBody]) -> BodyTypes:
         blocks=flat(blocks),
         block0=block0,
         is_diagonal=is_diagonal,
-        is_stiffened=is_stiffened,
+        has_unit_loads=has_unit_loads,
     )

@@ -31,6 +31,7 @@ __all__ = [
     "marker_shapes",
     "marker_with_pose",
     "n_q_of",
+    "same_markers",
 ]
 
 GROUND_INDEX = -1
@@ -211,6 +212,19 @@ def marker_shapes(markers: list[MarkerShape]) -> tuple[list[int], Array]:
             parts.append(marker.psi)
             n += marker.psi.size
     return start, flat(parts)
+
+
+def same_markers(markers: Sequence[MarkerData], bend0: Sequence[int], line: IntArray) -> list[int]:
+    """Return for each marker an earlier one whose place deforms in the same way, -1 for none; none of them slides."""
+    known: dict[tuple[object, ...], int] = {}
+    same = []
+    for m, (body, shape) in enumerate((marker.body, marker.shape) for marker in markers):
+        if shape.psi is None or line[m] >= 0:
+            same.append(-1)
+            continue
+        other = known.setdefault((body, bend0[m], shape.position.tobytes(), shape.psi.tobytes()), m)
+        same.append(other if other < m else -1)
+    return same
 
 
 def marker_bending(markers: list[MarkerShape]) -> tuple[list[int], Array]:

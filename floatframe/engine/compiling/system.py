@@ -24,6 +24,7 @@ from floatframe.engine.compiling.markers import (
     marker_pose,
     marker_shapes,
     n_q_of,
+    same_markers,
 )
 from floatframe.engine.compiling.pair_forces import add_pair_laws
 from floatframe.engine.compiling.placing import placed_state
@@ -446,6 +447,7 @@ def marker_record(
     a0[moving] = np.cumsum([0] + [6 + int(made.n_q[markers[m].body]) for m in moving])[:-1]
     psi0, psi = marker_shapes(shapes)
     bend0, bend = marker_bending(shapes)
+    line = lines.of_markers(len(markers))
     return filled(
         Markers(),
         body=[marker.body for marker in markers],
@@ -455,13 +457,14 @@ def marker_record(
         psi=psi,
         bend0=bend0,
         bend=bend,
+        same=same_markers(markers, bend0, line),
         connection=made.connection_of,
         sign=made.sign,
         force=made.force,
         moment=made.moment,
         is_follower=turns,
         x0=x0,
-        line=lines.of_markers(len(markers)),
+        line=line,
         accelerated=accelerated,
         a0=a0,
     )

@@ -10,6 +10,7 @@ import numpy as np
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.newton_equations import linearized, set_iterate
 from floatframe.engine.kernels.work import new_work
+from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.state import State
 from floatframe.model.system import System
 
@@ -19,7 +20,7 @@ __all__ = ["indefinite_mass_words", "indefinite_masses"]
 def indefinite_masses(system: System, state: State) -> tuple[str, ...]:
     """Return the names of the stiffened bodies whose mass matrix is not positive definite at a state."""
     model = compiled_system(system).model
-    stiffened = [i for i, kind in enumerate(model.bodies.kind) if model.body_types.is_stiffened[kind]]
+    stiffened = [i for i, body in enumerate(system.bodies) if isinstance(body, FlexibleBody) and body.is_stiffened]
     if not stiffened or not all(np.isfinite(part).all() for part in (state.q, state.p)):
         return ()
     work = new_work(model)

@@ -197,7 +197,7 @@ def shape_moments(types, t, n, q, first):
     """Write 1C(q) = ds/dq of a type of bodies into `first`, (3, n); return its first moment s(q)."""
     own = block(types, t, C1, 3, n)
     copy(flat(own), flat(first))
-    if types.is_stiffened[t]:
+    if types.has_unit_loads[t]:
         add_products(block(types, t, K_TRANSLATION, n, 3 * n), q, flat(first))
     return add(vector(types.S[t]), scaled(0.5, add(column_sum(own, q), column_sum(first, q))))
 
@@ -211,7 +211,7 @@ def first_moments(model, work, i):
         put(bodies.s[i], 0, vector(types.S[t]))
         return
     put(bodies.s[i], 0, shape_moments(types, t, n, work.state.q[q0 : q0 + n], rows_of(bodies.C1, 3, q0, n)))
-    if types.is_stiffened[t]:
+    if types.has_unit_loads[t]:
         q_dot = work.state.u[u0 : u0 + n]
         constant_products(types, t, K_TRANSLATION, q_dot, rows_of(bodies.K_t_q_dot, 3, q0, n))
         constant_products(types, t, K_ROTATION, q_dot, rows_of(bodies.K_r_q_dot, 3, q0, n))
@@ -267,7 +267,7 @@ def modal_forces(model, work, i, a):
     modal_term(types, t, n, STIFFNESS, 1.0, q, h)
     f = add(column_sum(first, q_ddot), cross(scaled(2.0, omega), column_sum(first, q_dot)))
     tau = add(tau, scaled(2.0, turned(D_q_dot, omega)))
-    if types.is_stiffened[t]:
+    if types.has_unit_loads[t]:
         f = add(f, column_sum(rows_of(bodies.K_t_q_dot, 3, q0, n), q_dot))
         tau = add(tau, column_sum(rows_of(bodies.K_r_q_dot, 3, q0, n), q_dot))
     return f, tau
@@ -377,7 +377,7 @@ def modal_tangent(model, work, i, weights, H, turn):
         put(H[6 + k], 3, add(scaled(c_m, B_k), scaled(c_d, sub(scaled(2.0, column(Y, k)), J_omega))))
         put(turn[6 + k], 0, cross(b, a))
     modal_columns(model, work, i, c_d, c_k, H)
-    if types.is_stiffened[t]:
+    if types.has_unit_loads[t]:
         stiffened_columns(model, work, i, c_d, c_k, H)
     modal_block(types, t, n, MASS, c_m, H)
     modal_block(types, t, n, DAMPING, c_d, H)

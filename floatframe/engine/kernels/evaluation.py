@@ -8,7 +8,13 @@ from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.connection import connection_derivatives, connection_rows
 from floatframe.engine.kernels.dense import rows_of
 from floatframe.engine.kernels.joints.deformed_line import slide_marker
-from floatframe.engine.kernels.marker import marker_columns, marker_motion, marker_stiffness, wrench_to_body
+from floatframe.engine.kernels.marker import (
+    marker_columns,
+    marker_motion,
+    marker_stiffness,
+    repeat_motion,
+    wrench_to_body,
+)
 from floatframe.engine.kernels.marker_acceleration import acceleration_columns
 from floatframe.engine.kernels.rotation import right_jacobian, spin_jacobian
 from floatframe.engine.kernels.time_function import time_function
@@ -38,7 +44,10 @@ def evaluate(model, work, c_k):
 def evaluate_markers(model, work):
     """Write the motion of all markers and set their wrenches to zero."""
     for m in range(model.markers.body.shape[0]):
-        marker_motion(model, work, m)
+        if model.markers.same[m] >= 0:
+            repeat_motion(model, work, m)
+        else:
+            marker_motion(model, work, m)
     slide_markers(model, work)
 
 

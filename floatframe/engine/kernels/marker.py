@@ -34,7 +34,7 @@ from floatframe.engine.kernels.vector import (
 
 __all__ = [
     "bent_bias", "bent_by", "bent_rate", "body_omega", "marker_columns", "marker_motion", "marker_stiffness",
-    "pose_on_body", "shape", "shape_sum", "shapes_of", "wrench_to_body",
+    "pose_on_body", "repeat_motion", "shape", "shape_sum", "shapes_of", "wrench_to_body",
 ]  # fmt: skip
 
 
@@ -64,6 +64,21 @@ def marker_motion(model, work, m):
     put(markers.rho[m], 0, vector(own.position[m]))
     if own.psi0[m] >= 0:
         elastic_motion(model, work, m, i)
+    pose_on_body(model, work, m)
+
+
+@loops
+def repeat_motion(model, work, m):
+    """Write position, axes and velocities of marker m from the deformation at an earlier marker with its shapes."""
+    markers, other = work.markers, model.markers.same[m]
+    put(markers.rho[m], 0, vector(markers.rho[other]))
+    put(markers.rho_dot[m], 0, vector(markers.rho_dot[other]))
+    put(markers.angle[m], 0, vector(markers.angle[other]))
+    put(markers.angle_dot[m], 0, vector(markers.angle_dot[other]))
+    put(markers.spin[m], 0, vector(markers.spin[other]))
+    put_matrix(markers.T_left[m], matrix(markers.T_left[other]))
+    if model.markers.bend0[m] >= 0:
+        copy(flat(shapes_of(model, markers.psi, other)), flat(shapes_of(model, markers.psi, m)))
     pose_on_body(model, work, m)
 
 

@@ -95,7 +95,8 @@ class BodyTypes(NamedTuple):
     blocks: Array = real(Size("numbers of types"), unit="kg m^n, K: N/m, D: N s/m")
     block0: IntArray = integer(n_t, N_BLOCKS)  #: index of each of these arrays in `blocks`
     is_diagonal: IntArray = integer(n_t, 3)  #: whether M, K, D are stored as diagonals
-    is_stiffened: IntArray = integer(n_t)  #: whether geometric stiffness is included
+    #: whether K_t or K_r, geometric stiffness of unit loads, is not zero; in mean axes both are
+    has_unit_loads: IntArray = integer(n_t)
 
 
 class Markers(NamedTuple):
@@ -108,6 +109,7 @@ class Markers(NamedTuple):
     psi: Array = real(Size("numbers of psi"), unit="m, rad")
     bend0: IntArray = integer(n_m)  #: index of its matrices K_P [l, 6, k] in `bend`, -1 for none
     bend: Array = real(Size("numbers of bend"), unit="m, rad")
+    same: IntArray = integer(n_m)  #: earlier marker with the same place and shapes in the same body, -1 for none
     connection: IntArray = integer(n_m)  #: connection of which the marker is an end, -1 for none
     sign: Array = real(n_m)  #: sign of the wrench: +1 at end A, -1 at end B
     force: IntArray = integer(n_m)  #: index of the marker's force in the wrench of its connection, -1 for none

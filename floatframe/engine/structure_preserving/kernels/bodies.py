@@ -138,7 +138,7 @@ def inertia_force(types, discrete, step, t, start, end, q_mean, C_mean, out):
         across = scaled(m, cross(a, other))
         for k in range(n):
             out[k] += dot(omega, axial(tensor(W, k))) - dot(column(C_mean, k), across)
-        if types.is_stiffened[t]:
+        if types.has_unit_loads[t]:
             constant_products(types, t, K_TRANSLATION, other_rate, C)
             for k in range(n):
                 out[k] -= dot(column(C, k), a)

@@ -240,6 +240,29 @@ def test_markers_move_with_their_interface_and_carry_forces_to_it_with_the_same_
     assert_allclose(power, f @ work.markers.v[0] + t @ work.markers.omega[0], rtol=ROUNDOFF, atol=0)
 
 
+def test_markers_at_one_interface_share_its_deformation_bit_for_bit(particles):
+    """Loads at one interface, in axes of their own, with and without stiffening; another interface lies between."""
+    f, t = np.array([3.0, -2.0, 1.0]), np.array([0.5, 0.4, -0.3])
+    state, u_dot = random_state(3)
+    for stiffening in (True, False):
+        body = FlexibleBody("body", particles.body(), stiffening=stiffening)
+        axes = rotation_exp(t)
+        places = [Marker("body", "end_b"), Marker("body", "end_a"), Marker("body", "end_b", triad=axes)]
+        loads = [PointForce(f"load {k}", place, f, t, is_follower=True) for k, place in enumerate(places)]
+        model = compiled_system(System([body], forces=loads)).model
+        assert_array_equal(model.markers.same, [-1, -1, 0])
+        alone = model._replace(markers=model.markers._replace(same=np.full(3, -1)))
+        works = [new_work(model), new_work(alone)]
+        for each, work in zip((model, alone), works, strict=True):
+            set_iterate(work, state, u_dot)
+            evaluate_and_linearize(each, work, 1.0, 0.5, 0.25)
+            assert work.markers.spin[2].any()
+        for shared, own in zip(works[0].markers, works[1].markers, strict=True):
+            assert_array_equal(shared, own)
+        assert_array_equal(works[0].bodies.residual, works[1].bodies.residual)
+        assert_array_equal(works[0].solver.H, works[1].solver.H)
+
+
 def test_second_rates_of_constraints_are_the_derivative_of_their_rates():
     system = stiffened_system()
     model = compiled_system(system).model

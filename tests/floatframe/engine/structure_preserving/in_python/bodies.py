@@ -103,7 +103,7 @@ def step_bodies(model: Model, bodies: tuple[CentralBody, ...]) -> tuple[Body, ..
 
 def step_body(model: Model, i: int, body: CentralBody) -> Body:
     """Return body i with its functions."""
-    n, is_bent = body.n, body.n > 0 and bool(model.body_types.is_stiffened[model.bodies.kind[i]])
+    n, is_bent = body.n, body.n > 0 and bool(model.body_types.has_unit_loads[model.bodies.kind[i]])
     C3_k = np.moveaxis(stored_array(model, i, C3, 3, 3, n), 2, 0)
     return Body(
         **vars(body),
