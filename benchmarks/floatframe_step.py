@@ -6,7 +6,8 @@ Bodies are made of random point masses with 4 to 4000 rad/s, h = 1e-3, gravity; 
 alternating axes. Printed per case: processor time per step (the best of `runs`, by default five, of the compiled loop,
 results of every 100th step kept), Newton iterations and factorisations per step, and the time with geometric stiffness
 (of small random displacements of second order, so that the motion is nearly the same) by that without, the runs of both
-in turn. The first line is the time of the first call (compilation, or loading it from the cache).
+in turn; and the time of new factors (linearisation and factorisation) by that of an iteration, see `price`. The first
+line is the time of the first call (compilation, or loading it from the cache).
 """
 
 import sys
@@ -75,6 +76,32 @@ def measure(systems, n_steps, n_runs):
     return best, counts
 
 
+def price(system, n_steps, n_runs):
+    """Return the time of new factors over that of an iteration, and how far the measured times are from the fit.
+
+    The time of a step is fitted as a + b iterations + c factorisations to runs of several tolerances, in which factors
+    are renewed at once, by their usual rule, or as seldom as convergence allows.
+    """
+    model, best = compiled_system(system).model, {}
+    for _ in range(n_runs):
+        for tolerance in (1e-6, 1e-8, 1e-11):
+            for cost in (0.0, 1.0, 1e3):
+                method = GeneralizedAlpha(0.8, tolerance=tolerance)
+                memory, work = method.start(system, 0.0), new_work(model)
+                memory, *_ = method.advance(system, memory, work, t0=0.0, h=H, first=0, n_steps=10, every=100)
+                work.solver.price[...], work.solver.is_due[...] = cost, 1
+                before, start = counts_of(memory, work), time.thread_time()
+                memory, *_ = method.advance(system, memory, work, t0=0.0, h=H, first=10, n_steps=n_steps, every=10**6)
+                seconds, counts = (time.thread_time() - start) / n_steps, (counts_of(memory, work) - before) / n_steps
+                known = best.get((tolerance, cost))
+                if known is None or seconds < known[0]:
+                    best[tolerance, cost] = seconds, *counts
+    rows = np.array(list(best.values()))
+    seconds, A = rows[:, 0], np.column_stack([np.ones(len(rows)), rows[:, 1:]])
+    fit = np.linalg.lstsq(A / seconds[:, None], np.ones(len(rows)))[0]
+    return fit[2] / fit[1], np.abs(A @ fit / seconds - 1).max()
+
+
 def figures(short):
     """Return what the watch keeps."""
     told = {}
@@ -93,13 +120,14 @@ def main():
     start = time.perf_counter()
     measure([chain(1, 2)], 10, 1)
     print(f"first call {time.perf_counter() - start:.1f} s")
-    print("bodies  modes  us/step  us/step/body  iterations  factorisations  stiffened by plain")
+    print("bodies  modes  us/step  us/step/body  iterations  factorisations  stiffened by plain  factors by iteration")
     for n_bodies in (1, 10):
         for n_q in (8, 20, 50):
             systems = [chain(n_bodies, n_q, stiffening) for stiffening in (False, True)]
             (plain, stiffened), counts = measure(systems, n_steps, n_runs)
             per_step = plain * 1e6
-            counted = f"{counts[0]:11.2f} {counts[1]:15.3f} {stiffened / plain:19.2f}"
+            ratio, misfit = price(systems[0], 200, n_runs)
+            counted = f"{counts[0]:11.2f} {counts[1]:15.3f} {stiffened / plain:19.2f} {ratio:13.1f} ({misfit:.1%})"
             print(f"{n_bodies:6d} {n_q:6d} {per_step:8.1f} {per_step / n_bodies:13.1f} {counted}", flush=True)
 
 
