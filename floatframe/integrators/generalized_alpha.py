@@ -221,7 +221,7 @@ class GeneralizedAlpha(Integrator):
         *,
         full: bool,
         spin: Spin | None,
-        work: Work | None = None,
+        work: Work,
     ) -> StepFilter | None:
         """Return the filter of `initial_conditions.step_filter` for step size h; full: with s = 1; None if s = 0."""
         _, _, beta, gamma = self.coefficients
@@ -235,8 +235,9 @@ class GeneralizedAlpha(Integrator):
         self, compiled: CompiledSystem, memory: Memory, h: float, t: float, *, full: bool, spin: Spin | None
     ) -> Beginning:
         """Return the initial accelerations of a motion and their rates after the filter from `filter_at`."""
-        z = self.filter_at(compiled, memory, h, t, full=full, spin=spin)
-        return beginning_of(compiled, consistent_of(memory), t, h, z, spin=spin)
+        work = work_from(compiled.model, memory.w)
+        z = self.filter_at(compiled, memory, h, t, full=full, spin=spin, work=work)
+        return beginning_of(compiled, consistent_of(memory), t, h, z, work, spin=spin)
 
     def first_step(self, compiled: CompiledSystem, memory: Memory, h: float, t: float, spin: Spin | None) -> float:
         """Return the size of the first step, an equal part of h for which the estimated error is allowed."""
@@ -272,9 +273,10 @@ class GeneralizedAlpha(Integrator):
         state = memory.state
         rows = rows_closed_by_positions(compiled.model, self.stabilized)
         if rows.any():
-            z = self.filter_at(compiled, memory, h, t, full=True, spin=None)
+            work = work_from(compiled.model, memory.w)
+            z = self.filter_at(compiled, memory, h, t, full=True, spin=None, work=work)
             assert z is not None
-            begun = beginning_of(compiled, consistent_of(memory), t, h, z)
+            begun = beginning_of(compiled, consistent_of(memory), t, h, z, work)
             x = h * state.u + h**2 * (0.5 * begun.u_dot + ((alpha_m - alpha_f) / 2 + beta) * h * begun.rates)
             after = displaced(compiled.model, state, x)
             state = replace(state, u=state.u + closing_velocities(z, after, memory.w, t, h, rows))

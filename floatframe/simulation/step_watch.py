@@ -187,7 +187,7 @@ class Companion:
         except FloatframeError:
             return False
         self.memory, self.before, self.error_before, self.at, self.run = memory, self.at, self.error, last, end
-        self.error = self.share * difference(end.state, memory.state)
+        self.error = self.share * difference(end, memory)
         self.peak = np.maximum(self.peak, lengths(self.error))
         return True
 
@@ -348,7 +348,7 @@ class StepWatch:
                 halves = Companion.begun(self.integrator, begin, work, first, HALVES, events=events)
                 if halves.follow(system, end, last, t0, h, self.jumps):
                     self.first_error = np.maximum(self.first_error, halves.peak)
-                    self.update_size(begin.state, end.state, h)
+                    self.update_size(begin, end, h)
             if self.companion is None and self.is_long and (begin.h == 0.0 or first < FIRST_CHECK):
                 return None
             return self.compare(system, begin, end, t0, h, first, last, events)
@@ -373,7 +373,7 @@ class StepWatch:
         """
         u0 = compiled_system(system).model.bodies.u0[:-1, None] + np.arange(6)
         change = lengths((end.u_dot - begin.u_dot)[u0].reshape(-1, 2, 3)).max(axis=0)
-        way = lengths(difference(end.state, begin.state)).max(axis=0)
+        way = lengths(difference(end, begin)).max(axis=0)
         return bool((h**2 / 2 * change > SCREEN * self.limit * way).any())
 
     def skip(self, h: float) -> None:
@@ -397,8 +397,8 @@ class StepWatch:
                 self.refined(system, t0, self.companion)
         other = self.companion
         if self.is_comparable(last):
-            self.update_size(begin.state, end.state, h * (last - first))
-            self.turn = np.maximum(self.turn, turns_in_a_step(system, end.state, h))
+            self.update_size(begin, end, h * (last - first))
+            self.turn = np.maximum(self.turn, turns_in_a_step(system, end, h))
             if not self.follow(system, other, end, last, t0, h):  # the error found so far still counts
                 self.close_companion(h)
                 self.companions_done, self.next_window = True, last
@@ -539,13 +539,13 @@ class StepWatch:
         self.add_unwatched_steps(start, rate if self.error_per_step is None else (self.error_per_step + rate) / 2)
         self.total = self.total + size
         self.error_per_step, self.n_watched = rate, last
-        self.turn = np.maximum(self.turn, turns_in_a_step(system, end.state, h))
+        self.turn = np.maximum(self.turn, turns_in_a_step(system, end, h))
         begun, then = (middle, half) if last > middle else (start, before)
-        self.update_size(then.state, end.state, h * (last - begun))
+        self.update_size(then, end, h * (last - begun))
         return self.new_note(system, t0 + last * h, h) if self.is_judged(last) else None
 
-    def update_size(self, half: State, end: State, seconds: float) -> None:
-        """Update the largest displacements, rotations and speeds from two states that are `seconds` apart."""
+    def update_size(self, half: Memory, end: Memory, seconds: float) -> None:
+        """Update the largest displacements, rotations and speeds from two memories that are `seconds` apart."""
         assert self.initial_state is not None
         way = lengths(difference(end, self.initial_state)).max(axis=0)
         if way[1] > FULL_TURN:
@@ -563,7 +563,7 @@ class StepWatch:
         if other is not None and other.at < n_done < FIRST_VERDICT:  # a run of few steps ends within a double step
             halves = self.with_steps(HALVES, system, t0, other, is_light=False)
             if halves.follow(system, end, n_done, t0, h, self.jumps):
-                self.update_size(halves.begin.state, end.state, h * (n_done - halves.start))
+                self.update_size(halves.begin, end, h * (n_done - halves.start))
                 self.companion = other = halves
         found = self.close_companion(h)
         if self.error_per_step is None and not self.total.any():
@@ -700,16 +700,16 @@ def lengths(vectors: Array) -> Array:
     return np.sqrt((vectors**2).sum(axis=-1))
 
 
-def difference(state: State, other: State) -> Array:
+def difference(memory: Memory, other: Memory | State) -> Array:
     """Return differences of positions and rotation vectors between orientations, (n_b, 2, 3) [m, rad]."""
-    apart = np.empty((len(state.r), 2, 3))
-    apart[:, 0], apart[:, 1] = state.r - other.r, rotations_between(state.p, other.p)
+    apart = np.empty((len(memory.r), 2, 3))
+    apart[:, 0], apart[:, 1] = memory.r - other.r, rotations_between(memory.p, other.p)
     return apart
 
 
 def error_of(memory: Memory, other: Memory) -> Array:
     """Return the difference of two states: positions and orientations (n_b, 2, 3), modal coordinates, velocities."""
-    apart = difference(memory.state, other.state)
+    apart = difference(memory, other)
     return np.concatenate([apart.ravel(), memory.q - other.q, memory.u - other.u])
 
 
@@ -722,7 +722,7 @@ def moved(memory: Memory, apart: Array) -> Memory:
     return memory.changed(r=memory.r + way, p=p, q=memory.q + q, u=memory.u + u)
 
 
-def turns_in_a_step(system: System, state: State, h: float) -> Array:
+def turns_in_a_step(system: System, memory: Memory, h: float) -> Array:
     """Return the rotation of each body in a step of size h, (n_b,) [rad]."""
     u0 = compiled_system(system).model.bodies.u0[:-1]
-    return h * np.linalg.norm(state.u[u0[:, None] + np.arange(3, 6)], axis=1)
+    return h * np.linalg.norm(memory.u[u0[:, None] + np.arange(3, 6)], axis=1)

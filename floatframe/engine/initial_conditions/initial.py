@@ -431,15 +431,17 @@ def has_normal_friction(model: Model) -> bool:
     return bool((model.joint_forces.coefficient > 0).any())
 
 
-def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState, t: float, h: float) -> Array:
+def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState, t: float, h: float, work: Work) -> Array:
     """Return d(u_dot)/dt at a consistent state, (n_u,), by a difference over a tenth of the time step h.
+
+    work: arrays from `work_from`; overwritten.
 
     Its error is of second order in h. The difference is central, but forward if functions of time or laws may depend on
     t, because they may begin or jump there. Its interval contains no closing or opening of a contact, whose force does
     not act yet; the result is zero if this happens within a millionth of the step.
     """
     model, state, u_dot = compiled.model, consistent.state, consistent.u_dot
-    work, s = work_from(model, consistent.w), OF_STEP * h
+    s = OF_STEP * h
 
     def moved(step: float) -> State:
         after = displaced(model, state, step * state.u + 0.5 * step**2 * u_dot)

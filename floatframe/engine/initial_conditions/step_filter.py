@@ -96,7 +96,7 @@ def step_filter(
     c_d: float,
     c_k: float,
     spin: "Spin | None" = None,
-    work: Work | None = None,
+    work: Work,
 ) -> StepFilter:
     """Return the filter with matrix M + c_d D + c_k K at time t, at a state with its accelerations and wrenches.
 
@@ -106,7 +106,6 @@ def step_filter(
     A first filter, without any forces, finds which forces remain.
     """
     model, state = compiled.model, consistent.state
-    work = work_from(model, consistent.w) if work is None else work
     work.state.time[...] = t
     set_iterate(work, state, w=consistent.w)
     inertia = linearized(model, work, 1.0, 0.0, 0.0)
@@ -190,16 +189,18 @@ def beginning_of(
     t: float,
     h: float,
     z: StepFilter | None,
+    work: Work,
     *,
     spin: Spin | None = None,
 ) -> Beginning:
     """Return initial accelerations and rates at t for step size h; z None: unfiltered, from the equations of motion.
 
-    spin: bodies whose accelerations are filtered without the part due to the rotation of their axes.
+    work: arrays from `work_from`; overwritten. spin: bodies whose accelerations are filtered without the part due to
+    the rotation of their axes.
     """
     turn = np.zeros_like(consistent.u_dot) if spin is None else spin.turn
     u_dot = consistent.u_dot if z is None else turn + z.twice(consistent.u_dot - turn)
-    rates = acceleration_rates(compiled, ConsistentState(consistent.state, u_dot, consistent.w), t, h)
+    rates = acceleration_rates(compiled, ConsistentState(consistent.state, u_dot, consistent.w), t, h, work)
     if spin is not None:
         rates = rates + spin.further
     return Beginning(u_dot, rates if z is None else z(rates))

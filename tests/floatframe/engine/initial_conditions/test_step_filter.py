@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 import floatframe as ff
 from floatframe import GeneralizedAlpha, JointForce, Marker, PrismaticJoint, RigidBody, System
 from floatframe.engine.compiling.system import compiled_system
-from floatframe.engine.initial_conditions.initial import consistent_motion
+from floatframe.engine.initial_conditions.initial import consistent_motion, work_from
 from floatframe.engine.initial_conditions.step_filter import step_filter
 
 RATIOS = np.concatenate([np.logspace(-2, 0, 12), np.geomspace(1.05, 20, 60), np.logspace(1.4, 6, 24)])  #: omega h
@@ -79,7 +79,8 @@ def test_the_filter_is_a_fraction_of_two_matrices_for_springs_and_dampers():
     """Z = 1/(1 + c_d D/M + c_k K/M) along the spring; across it nothing moves."""
     system, axis = oscillator(50.0, 7.0)
     compiled = compiled_system(system)
-    z = step_filter(compiled, consistent_motion(system), 0.0, c_d=0.03, c_k=0.002)
+    found = consistent_motion(system)
+    z = step_filter(compiled, found, 0.0, c_d=0.03, c_k=0.002, work=work_from(compiled.model, found.w))
     y = np.concatenate([axis, np.zeros(3)])
     assert_allclose(z(y), y / (1 + 0.03 * 7.0 + 0.002 * 2500.0), rtol=1e-12, atol=1e-14)
     assert_allclose(z.twice(y), 2 * z(y) - z(z(y)), rtol=1e-12, atol=1e-14)
@@ -94,7 +95,8 @@ def test_the_filter_keeps_what_joints_ask_of_accelerations():
     hinge = ff.RevoluteJoint("hinge", pin, rim, axis=(0, 0, 1))
     system = System([disc], [hinge], [JointForce("spring", "hinge", "angle", stiffness=1e6, free=0.1)])
     found = consistent_motion(system)
-    z = step_filter(compiled_system(system), found, 0.0, c_d=0.01, c_k=0.01)
+    compiled = compiled_system(system)
+    z = step_filter(compiled, found, 0.0, c_d=0.01, c_k=0.01, work=work_from(compiled.model, found.w))
     towards, along = z(found.u_dot)[0], z(found.u_dot)[5]
     assert_allclose(towards, -0.3 * omega**2, rtol=1e-12)
     assert_allclose(along / found.u_dot[5], 1 / (1 + 0.01 * 1e6 / (1 + 2 * 0.3**2)), rtol=1e-2)
