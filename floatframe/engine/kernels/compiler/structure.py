@@ -131,7 +131,7 @@ def numbers_of(record) -> tuple[dict[str, tuple[int, bool]], IntArray]:
 
 def table_of_numbers(declaration, values: Mapping[str, float]) -> tuple[IntArray, Array]:
     """Return the table of a record of numbers, zero if not given, and the numbers, which the caller must keep alive."""
-    places, offsets = numbers_of(type(declaration))
+    places, offsets = numbers_of(type(declaration))  # type: ignore[arg-type]
     reals = np.zeros(len(places))
     integers = reals.view(np.int64)
     for name, value in values.items():
