@@ -125,6 +125,7 @@ class PublicElements:
             Laws(),
             address=[value for value, _ in self.addresses],
             tangent=[slopes for _, slopes in self.addresses],
+            is_costly=[not callable(law.tangent) for law in laws],
             head=self.heads,
             data0=offsets(integers([len(each.law.data) + len(each.sizes) for each in self.placed])),
             data=flat([np.concatenate([each.law.data, each.sizes]) for each in self.placed]),

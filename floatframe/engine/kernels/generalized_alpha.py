@@ -199,15 +199,22 @@ def take_to_body(model, state, i):
 
 
 @inner
-def take_age(solver, n_iterations):
+def take_age(solver, n_iterations, are_laws_new):
     """Count a step with the present factors, and request new ones if it needed more iterations than the mean.
 
-    The mean includes the cost of the factors. Further steps with them would raise it, while new factors keep it.
+    The mean includes the cost of the factors. Further steps with them would raise it, while new factors keep it. After
+    a step with old derivatives of laws these come first, and they do if it needed more iterations than the last step
+    with new ones.
     """
     solver.n_steps += 1
     solver.n_spent += n_iterations
-    if n_iterations * solver.n_steps > solver.n_spent:
-        solver.is_due = 1
+    is_slow = n_iterations * solver.n_steps > solver.n_spent
+    if are_laws_new:
+        solver.n_of_new_laws = n_iterations
+        if is_slow:
+            solver.is_due = 1
+    elif is_slow or n_iterations > solver.n_of_new_laws:
+        solver.is_law_due = 1
 
 
 @inner
@@ -561,6 +568,15 @@ def keeps_connections(model, work, h):
     )
 
 
+@small
+def has_costly_laws(model):
+    """Whether old derivatives of laws are used for further steps."""
+    for i in range(model.laws.is_costly.shape[0]):
+        if model.laws.is_costly[i] == 1:
+            return True
+    return False
+
+
 @inner
 def one_step(model, work, memory, order, h):
     """Advance the memory by one step, unless the estimated error is larger than allowed.
@@ -584,6 +600,8 @@ def one_step(model, work, memory, order, h):
     mass = total_mass(model)
     least_gap = SAFE * wanted / math.sqrt(mass) if mass > 0.0 else 0.0  # all bodies are within the limit
     is_new, is_aged, first_of_rates = not keeps_connections(model, work, h), False, 0.0
+    is_law_due = solver.is_law_due == 1 or is_new
+    are_laws_new = not has_costly_laws(model)
     for iteration in range(order.max_iterations):
         evaluate(model, work, c_k)
         if iteration == 0 and order.stabilized != 0:
@@ -596,7 +614,7 @@ def one_step(model, work, memory, order, h):
                 return SINGULAR_BODY, body, excess, -1.0
             solver.c_m, solver.c_d, solver.c_k = c_m, c_d, c_k
             work.solver.is_due, solver.n_steps, solver.n_spent, solver.contraction = 0, 0, solver.price, -1.0
-            is_new = True
+            is_new, is_law_due = True, True
         elif iteration == 0:
             body = renew_turning(model, work, weights)
             if body >= 0:
@@ -604,7 +622,10 @@ def one_step(model, work, memory, order, h):
                 return SINGULAR_BODY, body, excess, -1.0
         connection = -1
         if is_new and solver.mu.shape[0] > 0:
-            connection = renew_connections(model, work, c_k)
+            are_all_new = is_law_due or iteration > 1
+            connection = renew_connections(model, work, c_k, are_all_new)
+            if are_all_new:
+                solver.is_law_due, are_laws_new = 0, True
         if connection >= 0:
             work.solver.is_due = 1
             return SINGULAR_CONNECTION, connection, excess, -1.0
@@ -652,9 +673,11 @@ def one_step(model, work, memory, order, h):
         is_stuck = norm <= 1e3 * allowed and norm > 0.5 * last and iteration > 2
         is_small = is_enough(norm, last, wanted, allowed) or is_stuck
         if is_small and are_states_enough(of_states, last_of_states, iteration):
-            take_age(work.solver, iteration + 1)
-            if is_aged:
+            take_age(work.solver, iteration + 1, are_laws_new)
+            if is_aged and are_laws_new:
                 work.solver.is_due = 1
+            elif is_aged:
+                work.solver.is_law_due = 1
             error = -1.0
             if is_too_long(model, work, h):
                 return UNRESOLVED, -1, excess, error
@@ -666,7 +689,10 @@ def one_step(model, work, memory, order, h):
             solver.t_end = work.state.time if iteration < FEW else -math.inf
             return DONE, -1, excess, error
         if norm > SLOW * last and not is_small:
-            work.solver.is_due = 1
+            if are_laws_new:
+                work.solver.is_due = 1
+            else:
+                is_new, is_law_due = True, True
         last, last_of_states = norm, of_states
         excess = max(excess, of_states)
     work.solver.is_due, work.solver.has_late_gaps = 1, 0

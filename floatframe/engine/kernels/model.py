@@ -275,6 +275,8 @@ class Laws(NamedTuple):
 
     address: IntArray = integer(n_laws)  #: address of the C function of the values
     tangent: IntArray = integer(n_laws)  #: address of the C function of the derivatives
+    #: whether the derivatives take an evaluation of the law for each input
+    is_costly: IntArray = integer(n_laws)
     #: numbers of markers, inputs of each marker, states, multipliers, outputs, data and moving markers, then 0
     head: IntArray = integer(n_laws, 8)
     data0: IntArray = integer(n_laws + 1)  #: index of the first data entry of each law

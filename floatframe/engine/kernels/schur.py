@@ -28,7 +28,7 @@ from floatframe.engine.kernels.dense import (
     subtract_product,
 )
 from floatframe.engine.kernels.evaluation import linearize, linearize_body
-from floatframe.engine.kernels.model import STIFFNESS
+from floatframe.engine.kernels.model import ELEMENT, STIFFNESS
 from floatframe.engine.kernels.vector import (
     add,
     copy,
@@ -69,7 +69,8 @@ SWEEPS = 5  # number of iterations: with soft 1e-9 of A, constraints with a cond
 @inner
 def factorize_bodies(model, work, weights):
     """Linearise at the iterate, factorise H of each body, write X, Z; return the body with singular H, or -1."""
-    linearize(model, work, weights)
+    for i in range(model.bodies.kind.shape[0]):
+        linearize_body(model, work, i, weights)
     return factorize_tangents(model, work)
 
 
@@ -127,7 +128,7 @@ def factorize_system(model, work):
     """Factorise H of every body and the matrix of the connections; return whether they are regular."""
     if factorize_tangents(model, work) >= 0:
         return False
-    assemble(model, work, 0.0)
+    assemble(model, work, 0.0, True)
     return factorize_connections(model.elimination, model.connections, work.solver) < 0
 
 
@@ -179,11 +180,13 @@ def pair_rows(model, solver, p):
 
 
 @inner
-def assemble(model, work, c_k):
-    """Assemble the block matrix of the connections at the iterate."""
+def assemble(model, work, c_k, are_all_new):
+    """Assemble the block matrix of the connections at the iterate; if not all are new, with old derivatives of laws."""
     work.solver.blocks[:] = 0.0
     for c in range(model.connections.size.shape[0]):
-        connection_derivatives(model, work, c, c_k)
+        is_kept = model.connections.law[c] == ELEMENT and model.laws.is_costly[model.connections.item[c]] == 1
+        if are_all_new or not is_kept:
+            connection_derivatives(model, work, c, c_k)
         own = diagonal_block(model.elimination, model.connections, work.solver, c)
         for r in range(own.shape[0]):
             for k in range(own.shape[1]):
@@ -302,9 +305,9 @@ def take_accelerated(model, work, m, n, y, mu):
 
 
 @inner
-def renew_connections(model, work, c_k):
-    """Assemble and factorise the connections at the iterate; return the connection with a singular block, or -1."""
-    assemble(model, work, c_k)
+def renew_connections(model, work, c_k, are_all_new):
+    """Assemble and factorise the connections, see `assemble`; return the connection with a singular block, or -1."""
+    assemble(model, work, c_k, are_all_new)
     return factorize_connections(model.elimination, model.connections, work.solver)
 
 
@@ -318,7 +321,7 @@ def correction(model, work, c_k, is_new):
     if work.solver.mu.shape[0] == 0:
         return -1
     if is_new:
-        singular = renew_connections(model, work, c_k)
+        singular = renew_connections(model, work, c_k, True)
         if singular >= 0:
             return singular
     close_connections(model, work)
@@ -451,7 +454,7 @@ def assemble_masses(model, work, c_k):
                 H[6 + k, 6 + k] += c_k * modal_number(types, t, n - 6, STIFFNESS, k)
     if factorize_tangents(model, work) >= 0:
         return False
-    assemble(model, work, 0.0)
+    assemble(model, work, 0.0, True)
     return True
 
 

@@ -295,6 +295,8 @@ class Solver(NamedTuple):
     t_end: Array = real(unit="s")  #: time at the end of the last step if it converged fast
     is_due: IntArray = integer()  #: whether to factorise at the next iterate
     price: Array = real()  #: cost of new factors, expressed in iterations
+    is_law_due: IntArray = integer()  #: whether to renew costly derivatives of laws with the factors of connections
+    n_of_new_laws: IntArray = integer()  #: iterations of the last step that began with new ones
     n_steps: IntArray = integer()  #: number of steps with the present factors
     n_spent: Array = real()  #: number of iterations in these steps, plus the cost of the factors
 
@@ -405,7 +407,7 @@ def new_work(model: Model, n_past: int = 0) -> Work:
     work.markers.psi[:] = model.markers.psi
     work.states.base[:] = model.states.start
     work.states.rho[...] = 1.0
-    work.solver.is_due[...] = 1
+    work.solver.is_due[...], work.solver.is_law_due[...] = 1, 1
     n = max(model.bodies.n_q, default=0)
     # `floatframe_step` of the benchmarks measured 2.3 to 3.2 iterations for 8 modes, 3.4 to 4.8 for 20, 3.8 to 6.1 for
     # 50; for few modes the price is lower, because old factors leave errors in the reactions (`test_newton_error`)

@@ -24,6 +24,7 @@ from floatframe.components.mechanisms import four_bar, slider_crank
 from floatframe.forces import SphereContact
 from tests.floatframe.integrators.examples import pendulum
 from tests.floatframe.model.bodies.examples import spinning
+from tests.floatframe.model.elements.laws import Yielding
 
 SMALL = 1e-3  # of the error of the integrator
 
@@ -65,6 +66,13 @@ def stiffly_sprung():
     return System([rod], [], [Gravity((0, 0, -9.81)), spring])
 
 
+def yielding():
+    """Return a rod in the field of a force that hardens and creeps."""
+    rod = RigidBody("rod", 1.0, np.diag([0.01, 0.1, 0.1]), velocity=(0, 0, 1.0), omega_B=(1.0, 2.0, 3.0))
+    force = Yielding("force", Marker("rod", position=(-0.2, 0.1, 0)))
+    return System([rod], [], [Gravity((0, 0, -9.81))], elements=[force])
+
+
 #: name: the system, h, the end
 PROBLEMS = {
     "elastic pendulum": (pendulum, 0.01, 0.5),
@@ -74,6 +82,7 @@ PROBLEMS = {
     "contact with friction": (bouncing, 0.0005, 0.1),
     "dry friction": (rubbing, 0.005, 0.6),
     "stiff spring": (stiffly_sprung, 0.001, 0.1),
+    "element with a state": (yielding, 0.002, 0.3),
 }
 
 

@@ -1,5 +1,6 @@
 """Elements that stand for built-in parts, which are their oracles."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -390,4 +391,35 @@ class OnPlane(Element):
             multiplier_units=("N",),
             holds=(POSITION,),
             tangent="complex",
+        )
+
+
+def yielding_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
+    """Pull back to a point that creeps after the marker, along z, harder than in proportion."""
+    stiffness, hardening, time = data
+    e = x[0, 2] - z[0]
+    wrench[0, 2] = -stiffness * e * (1 + hardening * e * e)
+    z_dot[0] = e / time
+
+
+compiled_yielding_law = njit(yielding_law)
+
+
+@dataclass(frozen=True, eq=False)
+class Yielding(Element):
+    name: str
+    marker: Marker
+    function: Callable[..., None] = compiled_yielding_law  #: `yielding_law`, or a function that calls it
+    tangent: str = "complex"
+
+    def law(self, placed):
+        return ElementLaw(
+            function=self.function,
+            data=[4e3, 50.0, 0.05],
+            states=("z",),
+            start=(0.0,),
+            state_units=("m",),
+            state_sizes=(0.1,),
+            acts=("force",),
+            tangent=self.tangent,
         )

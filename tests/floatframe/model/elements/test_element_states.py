@@ -26,7 +26,7 @@ from floatframe.results.energy_balance import balance_defect, energy_scale
 from floatframe.sensors import Channel, ElementSensor, PlaceSensor
 from tests.floatframe.finite_differences import assert_tangent_is_exact
 from tests.floatframe.model.elements.element_states_examples import DAMPER, MASS, SPRING, G, disc, jack_matrix, lifted
-from tests.floatframe.model.elements.laws import Circuit, Disc, Spring
+from tests.floatframe.model.elements.laws import Circuit, Disc, Spring, Yielding, yielding_law
 from tests.floatframe.orders import slope
 
 METHOD = GeneralizedAlpha(0.9, 1e-11)
@@ -68,6 +68,24 @@ def test_states_that_move_no_body_converge_in_every_step(tangent):
     assert_allclose(b, 0.5 * (np.cos(t) + np.sin(t) + np.exp(-t)), rtol=0, atol=3e-6)
     assert_allclose((a**3)[1:], b[1:], rtol=0, atol=2e-6)
     assert_allclose(flow + flow**3, b, rtol=0, atol=1e-9)
+
+
+def test_old_derivatives_of_a_law_serve_many_steps():
+    """A derivative by differences takes 26 evaluations, for three numbers of r, phi, v, omega each, and the state."""
+    calls = []
+
+    def counted(*arguments):
+        calls.append(1)
+        yielding_law(*arguments)
+
+    body = RigidBody("b", 1.0, np.eye(3), velocity=(0, 0, 1.0))
+    system = System([body], elements=[Yielding("y", Marker("b"), counted, "differences")])
+    steps = 200
+    motion = integrate(system, GeneralizedAlpha(0.9), 1e-3 * steps, 1e-3, watch="off")
+    assert len(calls) < 12 * steps
+    compiled = System([body], elements=[Yielding("y", Marker("b"))])
+    exact = integrate(compiled, GeneralizedAlpha(0.9, 1e-13), 1e-3 * steps, 1e-3, watch="off")
+    assert_allclose(motion.body("b").r, exact.body("b").r, rtol=0, atol=1e-8)
 
 
 def test_at_rest_states_stand_and_a_motion_goes_on_from_there():
