@@ -1,8 +1,8 @@
 """Derivatives of the law of wheels on rails by the motion of its marker, states and multipliers, in closed form.
 
-The numbers (1) to (7) are those of `law`. Along the track its axes rotate by its curvature k, and by the slope cant' of
-its cant angle: t' = k (cos cant n + sin cant b), n' = -k cos cant t - cant' b, b' = -k sin cant t + cant' n. At the
-nearest point ds = t·dW/(1 - k beside), with the distance beside the track in the horizontal plane.
+The numbers (1) to (7) are those of `law`. Along the track its axes rotate by its curvature k, and by the slope c' of
+its cant angle c: t' = k (cos c n + sin c b), n' = -k cos c t - c' b, b' = -k sin c t + c' n. At the nearest point
+ds = t·dW/(1 - k beside), with the distance beside the track in the horizontal plane.
 """
 
 from typing import NamedTuple
