@@ -61,6 +61,8 @@ def built(tmp_path_factory):
     kernels = folder / "fe_models" / "foundation" / "kernels"
     shutil.copytree(ROOT / "fe_models" / "foundation" / "kernels", kernels, ignore=shutil.ignore_patterns("__pyc*"))
     (folder / "floatframe").mkdir()
+    for package in ("floatframe", "fe_models", "fe_models/foundation"):
+        (folder / package / "__init__.py").touch()  # otherwise installed packages are found before these
     (folder / "floatframe" / "kernel.py").write_text(KERNEL)
     (folder / "floatframe" / "codes.py").write_text("FACTOR = 3.0\n")
     family = {"NUMBA_CPU_NAME": "x86-64-v3", "NUMBA_CPU_FEATURES": "", "NUMBA_DISABLE_INTEL_SVML": "1"}
