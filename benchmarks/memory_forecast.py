@@ -1,7 +1,7 @@
 """The forecast of memory beside what a reduction took: `cms reduce --memory`, a process each.
 
     python -m benchmarks.memory_forecast                    # rods of 50k and 160k dofs
-    python -m benchmarks.memory_forecast 300k 475k          # larger ones; 1M and 2M too
+    python -m benchmarks.memory_forecast 300k 475k          # larger ones; 1M and 2M (12 minutes) too
     python -m benchmarks.memory_forecast interfaces         # the body of benchmarks.interface_rich, 2043 boundary dofs
     python -m benchmarks.memory_forecast 160k 1.8GB         # with a budget, here one that takes the factor to disk
     python -m benchmarks.memory_forecast 160k threads=2     # of BLAS and of our own loops
