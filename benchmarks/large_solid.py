@@ -21,14 +21,8 @@ import numpy as np
 from benchmarks.records import print_record, record_of
 from benchmarks.rods import OUT, rod_file
 
-SIZES = {
-    "0.03": 4.8,
-    "0.06": 3.76,
-    "0.1": 3.0,
-    "0.25": 2.05,
-    "0.5": 1.62,
-    "1.0": 1.24,
-}  # million dofs -> element size [mm]
+#: million dofs -> element size [mm]
+SIZES = {"0.03": 4.8, "0.06": 3.76, "0.1": 3.0, "0.25": 2.05, "0.5": 1.62, "1.0": 1.24}
 N_MODES = 50
 
 

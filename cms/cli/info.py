@@ -41,7 +41,7 @@ def print_body(body: "ReducedBody", *, everything: bool = False, has_warned: boo
     """
     from cms.assessment.quality.body_record import body_record, body_size
     from cms.body.reduced_body import unit_findings
-    from cms.reduction.basis.damping import for_readers
+    from cms.reduction.basis.damping import provenance_for_readers
 
     record = body_record(body)
     length, mass, inertia = (
@@ -124,9 +124,9 @@ def print_body(body: "ReducedBody", *, everything: bool = False, has_warned: boo
             ],
         )
     if everything:
-        rows = record["provenance"] | {"damping": for_readers(record["provenance"].get("damping", "none"))}
-        width = max(map(len, rows))
-        say("\n".join(("Provenance", *(f"{key:<{width}}  {words}" for key, words in rows.items()))))
+        told = provenance_for_readers(record["provenance"])
+        width = max(map(len, told), default=0)
+        say("\n".join(("Provenance", *(f"{key:<{width}}  {words}" for key, words in told.items()))))
 
 
 def print_free_frequencies(record: Any) -> None:

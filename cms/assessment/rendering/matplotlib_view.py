@@ -62,7 +62,6 @@ class DrawnSurface:
     """Surface with data that all frames share: sharp edges, and smoothing of faces."""
 
     def __init__(self, surface: Surface, scene: Scene) -> None:
-
         self.surface = surface
         rest = surface.nodes_at(0)
         self.smoothing = smooth_neighbours(rest, surface.triangles)

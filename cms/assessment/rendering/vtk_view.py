@@ -239,15 +239,15 @@ def lookup_table() -> Any:
 
 def mesh_of(points: Array, cells: IntArray) -> Any:
     """Return triangles, (n, 3), or segments, (n, 2), as a mesh of VTK with its own points."""
-    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
+    from vtkmodules.util.numpy_support import numpy_to_vtkIdTypeArray
     from vtkmodules.vtkCommonCore import vtkPoints
     from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
 
-    mesh, corners, array = vtkPolyData(), vtkPoints(), vtkCellArray()
-    corners.SetData(numpy_to_vtk(np.array(points, dtype=np.float32), deep=True))
+    mesh, array = vtkPolyData(), vtkCellArray()
+    mesh.SetPoints(vtkPoints())
+    place([mesh], points)
     ends = np.arange(0, cells.size + 1, cells.shape[1])
     array.SetData(numpy_to_vtkIdTypeArray(ends, deep=True), numpy_to_vtkIdTypeArray(cells.ravel(), deep=True))
-    mesh.SetPoints(corners)
     if cells.shape[1] == 3:
         mesh.SetPolys(array)
     else:

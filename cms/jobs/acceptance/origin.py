@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from cms.reduction.basis.damping import for_readers
+from cms.reduction.basis.damping import provenance_for_readers
 from fe_models.foundation.paths import file_digest
 
 __all__ = ["GROUPS", "SourceFile", "origin_groups", "source_files"]
@@ -29,9 +29,9 @@ class SourceFile:
 def origin_groups(provenance: Mapping[str, str]) -> dict[str, dict[str, str]]:
     """Return texts by title and key; digests of files are only in the list of files."""
     groups: dict[str, dict[str, str]] = {title: {} for title in GROUPS}
-    for key, words in provenance.items():
+    for key, words in provenance_for_readers(provenance).items():
         title = next(title for title, starts in GROUPS.items() if key.startswith(starts))
-        groups[title][key] = for_readers(words) if key == "damping" else words
+        groups[title][key] = words
     return {title: rows for title, rows in reversed(groups.items()) if rows}
 
 

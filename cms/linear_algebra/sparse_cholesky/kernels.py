@@ -63,26 +63,26 @@ def graph_of(indptr, indices, representative, group):
 
 @jit
 def runs_of_similar(start, neighbours, share):
-    """Return the run of each vertex, (n,): consecutive vertices that have a share of all their neighbours in common.
+    """Return the run of each vertex, (n,): consecutive vertices whose neighbours are nearly those of the first of them.
 
-    The share is that of the common neighbours in all neighbours of a vertex and of the first one of the run; a vertex
-    is its own neighbour.
+    A vertex joins the run if it has at least this share of the neighbours of both in common with the first one. A
+    vertex counts as its own neighbour.
     """
     n = start.size - 1
-    run, of_first = np.zeros(n, np.int64), np.full(n, -1, np.int64)
+    run, seen_by = np.zeros(n, np.int64), np.full(n, -2, np.int64)  # the last first vertex with this neighbour
     first = -1
     for a in range(n):
-        common = 1 if first >= 0 and of_first[a] == first else 0
+        common = 1 if seen_by[a] == first else 0
         for e in range(start[a], start[a + 1]):
-            common += 1 if first >= 0 and of_first[neighbours[e]] == first else 0
+            common += 1 if seen_by[neighbours[e]] == first else 0
         n_both = start[a + 1] - start[a] + start[first + 1] - start[first] + 2 - common
         if first >= 0 and common >= share * n_both:
             run[a] = run[a - 1]
             continue
         run[a], first = run[a - 1] + 1 if a else 0, a
-        of_first[a] = a
+        seen_by[a] = a
         for e in range(start[a], start[a + 1]):
-            of_first[neighbours[e]] = a
+            seen_by[neighbours[e]] = a
     return run
 
 

@@ -6,6 +6,7 @@ frames therefore give different damping.
 """
 
 import ast
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -30,6 +31,7 @@ __all__ = [
     "for_readers",
     "heavy_words",
     "modal_damping",
+    "provenance_for_readers",
     "stated_damping",
     "statement_of",
 ]
@@ -168,6 +170,11 @@ def for_readers(words: str) -> str:
         case RayleighDamping(alpha, beta):
             return f"alpha M + beta K with alpha = {alpha:g}, beta = {beta:g}"
     return words
+
+
+def provenance_for_readers(provenance: Mapping[str, str]) -> dict[str, str]:
+    """Return a provenance whose damping is a sentence."""
+    return {key: for_readers(words) if key == "damping" else words for key, words in provenance.items()}
 
 
 def percent(ratio: float) -> str:

@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 from types import CodeType
 
-__all__ = ["PACKAGES", "ROOT", "digests", "imported_modules", "names_of", "source_digest", "source_files"]
+__all__ = ["PACKAGES", "ROOT", "digests", "imported_modules", "names_of", "source_files"]
 
 ROOT = Path(__file__).parents[3]  #: folder of the packages
 PACKAGES = ("cms", "fe_models", "floatframe")
@@ -46,34 +46,28 @@ def source_files(module: str, root: Path = ROOT) -> list[Path]:
     return sorted(known)
 
 
-def source_digest(module: str, *extra: str, root: Path = ROOT) -> int:
-    """Return a positive key that changes with `extra` and with the syntax of a module and of all that it imports.
+def digests(module: str, root: Path = ROOT) -> tuple[int, int]:
+    """Return two positive keys of a module and of all that it imports: of their syntax, and of their texts.
 
-    Syntax trees take a few tenths of a second. Therefore a file in this folder stores the last key together with a
-    digest of the texts of the sources. If no file can be written, as in an installation of another user, the key is the
-    digest of these texts.
+    Syntax trees take a few tenths of a second. Therefore a file stores the last key of the syntax together with that of
+    the texts. If no file can be written, as in an installation of another user, both are that of the texts.
     """
-    return digests(module, *extra, root=root)[0]
-
-
-def digests(module: str, *extra: str, root: Path = ROOT) -> tuple[int, int]:
-    """Return the key of the syntax (`source_digest`), and one that changes with every byte of the same sources."""
     texts = {path.relative_to(root).as_posix(): path.read_bytes() for path in source_files(module, root)}
-    whole = digest_of(extra, texts)
-    record = record_of(root, module, extra)
+    whole = digest_of(texts)
+    record = record_of(root, module)
     try:
         read, key = record.read_text(encoding="ascii").split()
         if read == f"{whole:x}":
             return int(key, 16), whole
     except (OSError, ValueError):  # there is no record yet, or it is incomplete
         pass
-    key_of_syntax = digest_of(extra, {name: syntax_of(text) for name, text in texts.items()})
+    key_of_syntax = digest_of({name: syntax_of(text) for name, text in texts.items()})
     return key_of_syntax if keep(record, f"{whole:x} {key_of_syntax:x}") else whole, whole
 
 
-def digest_of(extra: tuple[str, ...], texts: dict[str, bytes]) -> int:
+def digest_of(texts: dict[str, bytes]) -> int:
     """Return a positive hash of 56 bits."""
-    digest = hashlib.sha256(repr(extra).encode())
+    digest = hashlib.sha256()
     for name, text in texts.items():
         digest.update(repr((name, len(text))).encode() + text)
     return int.from_bytes(digest.digest()[:7], "big") + 1
@@ -98,10 +92,9 @@ def syntax_of(text: bytes) -> bytes:
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 
-def record_of(root: Path, module: str, extra: tuple[str, ...]) -> Path:
+def record_of(root: Path, module: str) -> Path:
     """Return the file that stores the key of a module, one for each Python version because syntax trees differ."""
-    name = "-".join((module, *extra, str(sys.implementation.cache_tag)))
-    return root / PACKAGES[-1] / "__pycache__" / f"{name}.key"
+    return root / PACKAGES[-1] / "__pycache__" / f"{module}-{sys.implementation.cache_tag}.key"
 
 
 def keep(record: Path, words: str) -> bool:

@@ -37,6 +37,7 @@ __all__ = [
     "contact_of_part",
     "deviation",
     "four_rows",
+    "patch_of_contact",
     "place_of_wheel",
     "spin_of_wheels",
     "vector_sum",
@@ -249,6 +250,14 @@ def contact_of_part(field, place, side, arm, axle):
 
 
 @jit
+def patch_of_contact(field, N, G, mu):
+    """Return the ellipse of a contact with these fields, equation (5)."""
+    third = np.log(N) / 3
+    a, b = np.exp(field[7] + third), np.exp(field[8] + third)
+    return Patch(N, a, b, np.exp(field[9]), np.exp(field[10]), np.exp(field[11]), np.exp(field[12]), G, mu)
+
+
+@jit
 def spin_of_wheels(z, inertia, omega, axle):
     """Return the angular velocity of the wheels: that of the marker or, with an inertia, the state about the axle."""
     if inertia > 0:
@@ -315,19 +324,16 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, outputs):
                 continue
             fx, fy, moment, ft = zero, zero, zero, zero
             if N.real > 0:  # a constrained wheel can also be pulled; there are no creep forces then
-                third = np.log(N) / 3
-                a, b = np.exp(field[7] + third), np.exp(field[8] + third)
                 xi, eta = inner_product(slip, place.t) / V, inner_product(slip, e) / V
                 phi = inner_product(spin, m) / V
-                c11, c22, c23, c33 = np.exp(field[9]), np.exp(field[10]), np.exp(field[11]), np.exp(field[12])
-                creepage, patch = Creepage(ahead * xi, ahead * eta, phi), Patch(N, a, b, c11, c22, c23, c33, G, mu)
+                creepage, patch = Creepage(ahead * xi, ahead * eta, phi), patch_of_contact(field, N, G, mu)
                 fx, fy, moment = creep_force(law, creepage, patch, options, V)
                 fx, fy = ahead * fx, ahead * fy
                 # component of the normal force along the rail due to irregularities
                 ft = fx + N * contact.cos * (side * field[1] * place.along_y - place.along_z)
                 tread = -(fx * xi + fy * eta + moment * phi)
-                outputs[out + 3] = a
-                outputs[out + 4] = b
+                outputs[out + 3] = patch.a
+                outputs[out + 4] = patch.b
                 outputs[out + 5] = xi
                 outputs[out + 6] = eta
                 outputs[out + 7] = phi

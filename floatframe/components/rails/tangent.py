@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fe_models.foundation.kernels.jit import jit
-from floatframe.components.rails.creep import N_CREEP_INPUTS, Creepage, Patch, creep_slopes
+from floatframe.components.rails.creep import N_CREEP_INPUTS, Creepage, creep_slopes
 from floatframe.components.rails.law import (
     N_FIELDS,
     N_HEAD,
@@ -20,6 +20,7 @@ from floatframe.components.rails.law import (
     contact_fields,
     contact_of_part,
     four_rows,
+    patch_of_contact,
     place_of_wheel,
     spin_of_wheels,
     vector_sum,
@@ -172,20 +173,21 @@ def spin_step(z, inertia, omega, axle, step):
 
 
 @jit
-def creep_slopes_of_contact(inputs, by_place, by_inputs, slopes):
+def creep_slopes_of_contact(patch, by_place, by_inputs, slopes):
     """Write the derivatives of creep forces by xi, eta, phi, N, V, shift, roll and sine of the yaw, (3, 8).
 
     by_inputs are those by the inputs of `creep_force`. Of these the semi-axes change with the cube root of N, and they
     and Kalker's coefficients with the fields, their logarithms, whose derivatives are by_place.
     """
+    numbers = patch.a, patch.b, patch.c11, patch.c22, patch.c23, patch.c33
     for r in range(3):
         slopes[r, 0], slopes[r, 1], slopes[r, 2] = by_inputs[r, 0], by_inputs[r, 1], by_inputs[r, 2]
-        of_axes = by_inputs[r, 4] * inputs[4] + by_inputs[r, 5] * inputs[5]
-        slopes[r, 3], slopes[r, 4] = by_inputs[r, 3] + of_axes / (3 * inputs[3]), by_inputs[r, 10]
+        of_axes = by_inputs[r, 4] * patch.a + by_inputs[r, 5] * patch.b
+        slopes[r, 3], slopes[r, 4] = by_inputs[r, 3] + of_axes / (3 * patch.N), by_inputs[r, 10]
         for p in range(3):
             total = 0.0
             for k in range(4, 10):
-                total += by_inputs[r, k] * inputs[k] * by_place[p][k + 3]
+                total += by_inputs[r, k] * numbers[k - 4] * by_place[p][k + 3]
             slopes[r, 5 + p] = total
 
 
@@ -200,7 +202,7 @@ def tangent_of_wheels(t, x, z, lam, data, slopes):
     n_parts = int(data[1])
     all_fields, fields = np.empty((n_parts, N_FIELDS)), np.empty(N_FIELDS)  # values, and their change by a step
     by_v, by_roll, by_sine = np.empty(all_fields.shape), np.empty(all_fields.shape), np.empty(all_fields.shape)
-    inputs, by_inputs, of_creep = np.empty(N_CREEP_INPUTS), np.empty((3, N_CREEP_INPUTS)), np.zeros((3, 8))
+    by_inputs, of_creep = np.empty((3, N_CREEP_INPUTS)), np.zeros((3, 8))
     M = (0.0, 0.0, 0.0)  # moment of all wheels on the marker
     for wheel in range(int(data[0])):
         at = N_HEAD + wheel * N_WHEEL
@@ -237,15 +239,10 @@ def tangent_of_wheels(t, x, z, lam, data, slopes):
             phi = inner_product(spin, m) / V
             fx, fy, moment, uphill = 0.0, 0.0, 0.0, 0.0
             if N > 0:
-                third = np.log(N) / 3
-                inputs[3], inputs[4], inputs[5] = N, np.exp(field[7] + third), np.exp(field[8] + third)
-                for k in range(6, 10):
-                    inputs[k] = np.exp(field[k + 3])
-                creepage = Creepage(ahead * xi, ahead * eta, phi)
-                patch = Patch(N, inputs[4], inputs[5], inputs[6], inputs[7], inputs[8], inputs[9], G, mu)
+                creepage, patch = Creepage(ahead * xi, ahead * eta, phi), patch_of_contact(field, N, G, mu)
                 fx, fy, moment = creep_slopes(law, creepage, patch, options, V, by_inputs)
                 fx, fy = ahead * fx, ahead * fy
-                creep_slopes_of_contact(inputs, by_place, by_inputs, of_creep)
+                creep_slopes_of_contact(patch, by_place, by_inputs, of_creep)
                 uphill = side * field[1] * place.along_y - place.along_z
             else:
                 of_creep[:, :] = 0.0

@@ -106,7 +106,7 @@ def run(model_table, work_table, memory_table, rows_table, order_table):
         memory.power[GIVEN], memory.power[TAKEN] = power(model, work)
     else:
         weights, c_k = NewtonWeights(order.c_m, order.c_d, order.c_k), order.c_k
-        work.solver.is_law_due = 1
+        work.solver.is_law_due = 1  # tasks of this branch overwrite the derivatives that steps keep
         evaluate(model, work, c_k if c_k > 0.0 else 1.0)
         if what == LINEARIZE:
             linearize(model, work, weights)

@@ -416,9 +416,8 @@ def wanted_damping(case: Case) -> tuple[Array | None, str]:
             return None, ""
         asked = str(options.damping) if options.damping else "none"
         if asked == told:
-            return carried_damping(
-                case, options.damping, options.frame
-            ), f"the job: {for_readers(asked)}, transformed to this frame"
+            D = carried_damping(case, options.damping, options.frame)
+            return D, f"the job: {for_readers(asked)}, transformed to this frame"
         # the conversion replaced all damping by damping ratios of the new modes
         return None if damping is None or isinstance(damping, StrainDamping) else modal_damping(
             damping, reduced.M, reduced.K, second=reduced.units.time

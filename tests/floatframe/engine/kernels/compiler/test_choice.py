@@ -19,9 +19,9 @@ from tests.root import ROOT
 CODE = "from floatframe.engine.kernels.compiler.choice import is_lean, words; print(is_lean, words())"
 
 
-def said(compiler: str, version: str = numba.__version__) -> subprocess.CompletedProcess[str]:
+def said(compiler: str, version: str = numba.__version__, code: str = CODE) -> subprocess.CompletedProcess[str]:
     """Return what a process says that is told to take a compiler, with a numba of that version."""
-    code = f"import numba; numba.__version__ = {version!r}; {CODE}"
+    code = f"import numba; numba.__version__ = {version!r}; {code}"
     environment = {**os.environ, "PYTHONPATH": str(ROOT), VARIABLE: compiler}
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=False)
 
@@ -41,6 +41,15 @@ def test_any_other_numba_compiles_plainly_and_says_why(version):
 def test_the_switch_takes_the_plain_compiler():
     words = f"False plain, with numba {KNOWN_VERSIONS[0]}.0 (requested by {VARIABLE})\n"
     assert said("plain", f"{KNOWN_VERSIONS[0]}.0").stdout == words
+
+
+KEY = "from floatframe.engine.kernels.entry import absolute_kernels; print(absolute_kernels.compiled._cache.own.words)"
+
+
+def test_the_key_of_stored_code_tells_the_compilers_apart():
+    lean, plain = (said(compiler, code=KEY) for compiler in ("lean", "plain"))
+    assert lean.returncode == plain.returncode == 0, lean.stderr + plain.stderr
+    assert lean.stdout != plain.stdout
 
 
 MOTION = """
